@@ -1,0 +1,198 @@
+"""Scenes in, repaired scenes and certificates out: the public face of the optimiser."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from panoscene.arrange._batch import ArrangementBatch, collate_scenes
+from panoscene.arrange._certificate import Certificate, Measures, measure
+from panoscene.arrange._energy import energy_terms
+from panoscene.arrange._kernel import make_kernel
+from panoscene.arrange._problem import Problem, boxes_from_variables, make_problem
+from panoscene.arrange._settings import ArrangementSettings
+from panoscene.arrange._solver import descend
+from panoscene.geometry import OrientedBoxes
+from panoscene.scene import Scene
+
+_SLACK = 1e-5
+"""Relative and absolute rounding error that does not count as worse."""
+_BLENDS = (0.5, 0.25, 0.1)
+"""Parts of the way to the solution that are tried when the solution itself is not acceptable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrangement:
+    """A repaired scene, what it is worth, and how it came about."""
+
+    scene: Scene
+    """The scene with its boxes replaced; everything else as it came."""
+    certificate: Certificate
+    path: tuple[OrientedBoxes, ...] = ()
+    """Boxes from the start to the end of the descent, when they were asked for."""
+
+
+def arrange(
+    scene: Scene, settings: ArrangementSettings | str = "default", *, frames: int = 0
+) -> Arrangement:
+    """Return the scene with its objects moved to agree with physics, relations and image.
+
+    Args:
+        scene: boxes, layout and relations; relations that are missing are derived from the boxes.
+        settings: a preset's name or your own settings.
+        frames: number of intermediate states to keep in ``path``.
+
+    Raises:
+        ValueError: boxes that cannot be arranged (NaN, infinite, sizes not positive), or an
+            unknown preset.
+
+    Source: DeepPanoContext, Sec. 3.3 "Relation optimization".
+    """
+    return arrange_scenes([scene], settings, frames=frames)[0]
+
+
+def arrange_scenes(
+    scenes: Sequence[Scene], settings: ArrangementSettings | str = "default", *, frames: int = 0
+) -> list[Arrangement]:
+    """Return one arrangement for each scene, solved as one padded batch.
+
+    Arguments and errors as in ``arrange``.
+    """
+    if isinstance(settings, str):
+        settings = ArrangementSettings.preset(settings)
+    if not scenes:
+        return []
+    with torch.no_grad():
+        batch = collate_scenes(scenes)
+        problem = make_problem(batch, settings)
+        marks = {round(settings.steps * i / max(frames - 1, 1)) for i in range(frames)}
+        late = settings.steps * 3 // 4
+        final, kept = _descend(problem, keep={*marks, late, settings.steps // 2})
+        before = _measure(problem.start, problem)
+        chosen = _choose(problem, final, kept, before)
+        path = [boxes_from_variables(kept[mark], problem) for mark in sorted(marks)]
+    late_energy = energy_terms(kept[late], problem).sum(-1) if late in kept else None
+    results = []
+    for index, scene in enumerate(scenes):
+        count = len(scene.objects.boxes)
+        boxes = chosen.boxes[index, :count] if chosen.changed[index] else scene.objects.boxes
+        certificate = Certificate(
+            preset=settings.name,
+            steps=settings.steps,
+            changed=bool(chosen.changed[index]),
+            converged=_converged(before, chosen.final_energy, late_energy, index),
+            outcome=chosen.outcome[index],
+            before=before.violations(index),
+            after=(chosen.after if chosen.changed[index] else before).violations(index),
+        )
+        results.append(
+            Arrangement(
+                scene=replace(scene, objects=replace(scene.objects, boxes=boxes)),
+                certificate=certificate,
+                path=tuple(frame[index, :count] for frame in path),
+            )
+        )
+    return results
+
+
+def optimise_boxes(
+    batch: ArrangementBatch,
+    settings: ArrangementSettings,
+    weights: Float[Tensor, " terms"] | None = None,
+) -> OrientedBoxes:
+    """Return the optimised boxes with gradients to start boxes, relation scores and weights.
+
+    The steps are unrolled, so memory grows with ``settings.steps`` (the paper trains with few
+    steps at batch size 1). Stop-gradients: which boxes collide, the side of a wall, the bounding
+    corner, the arg-max bin, and thresholds; the confidence above a threshold is differentiable.
+    ``safe`` is not applied: choosing between input and output has no gradient.
+
+    Args:
+        batch: scenes from ``collate_scenes``; may require gradients.
+        settings: how to solve.
+        weights: lambda of every term in the order of ``TERM_NAMES``, instead of the settings'.
+    """
+    problem = make_problem(batch, settings, weights)
+    final, _ = descend(problem.start, make_kernel(problem), settings)
+    return boxes_from_variables(final, problem)
+
+
+def energy(
+    batch: ArrangementBatch,
+    settings: ArrangementSettings,
+    weights: Float[Tensor, " terms"] | None = None,
+) -> Float[Tensor, "scenes terms"]:
+    """Return the energy terms of the scenes as they stand, in the order of ``TERM_NAMES``."""
+    problem = make_problem(batch, settings, weights)
+    return energy_terms(problem.start, problem)
+
+
+def _descend(problem: Problem, keep: set[int]) -> tuple[Tensor, dict[int, Tensor]]:
+    """Run the solver with the array library that suits the device."""
+    kernel = make_kernel(problem)
+    if problem.start.device.type != "cpu":
+        return descend(problem.start, kernel, problem.settings, keep)
+    final, kept = descend(problem.start.numpy(), kernel.numpy(), problem.settings, keep)
+    return torch.from_numpy(final), {step: torch.from_numpy(x) for step, x in kept.items()}
+
+
+def _measure(variables: Tensor, problem: Problem) -> Measures:
+    boxes = boxes_from_variables(variables, problem)
+    return measure(boxes, problem.batch, energy_terms(variables, problem))
+
+
+@dataclass(frozen=True, slots=True)
+class _Chosen:
+    boxes: OrientedBoxes
+    after: Measures
+    changed: Tensor
+    outcome: list[str]
+    final_energy: Tensor
+
+
+def _choose(
+    problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Measures
+) -> _Chosen:
+    """Take the solution of each scene, or with ``safe`` the best acceptable state."""
+    start = problem.start
+    finite = torch.isfinite(final).all(0).all(-1)
+    final = torch.where(finite[None, :, None], final, start)
+    best, after = final, _measure(final, problem)
+    final_energy = after.energy.sum(-1)
+    words = ["solved" if good else "diverged, input returned" for good in finite.tolist()]
+    changed = finite.clone()
+    if problem.settings.safe:
+        accepted = _acceptable(after, before)
+        words = ["solved" if good else "input returned" for good in accepted.tolist()]
+        candidates = [(f"state after {step} steps", kept[step]) for step in sorted(kept, reverse=True)]
+        candidates += [(f"{part:.0%} of the way", start + part * (final - start)) for part in _BLENDS]
+        for label, candidate in candidates:
+            if bool(accepted.all()):
+                break
+            trial = _measure(candidate, problem)
+            take = _acceptable(trial, before) & ~accepted
+            best = torch.where(take[None, :, None], candidate, best)
+            words = [label if new else word for new, word in zip(take.tolist(), words, strict=True)]
+            accepted = accepted | take
+        best = torch.where(accepted[None, :, None], best, start)
+        after = _measure(best, problem)
+        changed = accepted
+    changed = changed & (best != start).any(0).any(-1)
+    return _Chosen(boxes_from_variables(best, problem), after, changed, words, final_energy)
+
+
+def _acceptable(after: Measures, before: Measures) -> Tensor:
+    """Return for each scene whether nothing that must not grow has grown."""
+    new, old = after.columns(), before.columns()
+    return (new <= old + _SLACK * (1 + old.abs())).all(-1) & torch.isfinite(new).all(-1)
+
+
+def _converged(
+    before: Measures, final_energy: Tensor, late_energy: Tensor | None, index: int
+) -> bool:
+    if late_energy is None:
+        return False
+    start, late, end = before.energy[index].sum(), late_energy[index], final_energy[index]
+    return bool((late - end).abs() <= 0.01 * (start - end).abs() + 1e-9)

@@ -1,0 +1,228 @@
+"""Settings of the arrangement optimiser and its three presets."""
+
+from typing import Literal
+
+import torch
+from jaxtyping import Float
+from pydantic import BaseModel, ConfigDict, Field
+from torch import Tensor
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class TermWeights(_Frozen):
+    """The weight (lambda) of every energy term; symbols of the paper in brackets.
+
+    Source: the paper's supplement, table of relation-optimisation weights.
+    """
+
+    object_collision: float = 1.0
+    """[oc] overlap of two objects."""
+    wall_collision: float = 1.0
+    """[wc] box corners outside the floor polygon."""
+    floor_collision: float = 1.0
+    """[fc] boxes below the floor."""
+    ceiling_collision: float = 1.0
+    """[cc] boxes above the ceiling."""
+    relative_yaw: float = 0.1
+    """[rr] between objects."""
+    relative_yaw_wall: float = 0.1
+    """[rr] between an object and a wall."""
+    touching: float = 1.0
+    """[oa] between objects."""
+    touching_wall: float = 1.0
+    """[oa] between an object and a wall."""
+    on_floor: float = 1.0
+    """[fa] gap between an object and the floor."""
+    under_ceiling: float = 1.0
+    """[ca] gap between an object and the ceiling."""
+    farther_than: float = 0.01
+    """[rd] wrong order of distances from the camera."""
+    direction: float = 0.0001
+    """[delta] the projected centre leaves where it was seen."""
+    distance: float = 0.01
+    """[d] the distance leaves its estimate."""
+    size: float = 1.0
+    """[s] the size leaves its estimate."""
+    yaw: float = 0.001
+    """[theta] the yaw leaves its estimate."""
+    reprojection: float = 10.0
+    """[bp] the projected box leaves the BFoV."""
+
+    def tensor(
+        self, dtype: torch.dtype = torch.float32, device: torch.device | None = None
+    ) -> Float[Tensor, " terms"]:
+        """Return the weights as a vector in the order of ``TERM_NAMES``."""
+        values = [getattr(self, name) for name in TERM_NAMES]
+        return torch.tensor(values, dtype=dtype, device=device)
+
+
+TERM_NAMES: tuple[str, ...] = tuple(TermWeights.model_fields)
+"""The energy terms in the order of every weight vector."""
+
+COLLISION_TERMS = TERM_NAMES[0:4]
+"""E^c of the paper."""
+RELATION_TERMS = TERM_NAMES[4:11]
+"""E^r of the paper."""
+OBSERVATION_TERMS = TERM_NAMES[11:16]
+"""E^o of the paper."""
+
+
+class Thresholds(_Frozen):
+    """Scores above which a relation counts; a weight grows linearly from there to 1."""
+
+    touching: float = Field(0.5, ge=0, lt=1)
+    touching_wall: float = Field(0.5, ge=0, lt=1)
+    on_floor: float = Field(0.5, ge=0, lt=1)
+    under_ceiling: float = Field(0.5, ge=0, lt=1)
+    inside_room: float = Field(0.5, ge=0, lt=1)
+    farther_than: float = Field(0.5, ge=0, lt=1)
+    relative_yaw: float = Field(0.5, ge=0, lt=1)
+    observation: float = Field(0.5, ge=0, lt=1)
+
+
+class ArrangementSettings(_Frozen):
+    """Everything that defines one way of arranging; start from a preset and change fields.
+
+    Example:
+        >>> ArrangementSettings.preset("paper").steps
+        100
+        >>> PRESETS["default"].model_copy(update={"steps": 20}).steps
+        20
+    """
+
+    name: str = "default"
+    weights: TermWeights = TermWeights()
+    thresholds: Thresholds = Thresholds()
+    label: Literal["binary", "confidence"] = "confidence"
+    """A relation's weight: 1 above its threshold, or growing from 0 at the threshold to 1."""
+    inside_room_label: Literal["probability", "confidence"] = "confidence"
+    """Weight of the wall terms: the score itself (paper), or as ``label`` (release)."""
+    inside_room_on_touching: bool = True
+    """Whether the contact with walls is weighted with inside_room too."""
+    observation_confidence: bool = True
+    """Whether distance, size and yaw are held by their confidence above the threshold."""
+    reduction: Literal["sum", "mean"] = "sum"
+    """Sum of all entries of a term, or their mean (zeros included)."""
+    loss_beta: float = Field(0.0, ge=0)
+    """Errors below this are squared (Huber, 'SmoothL1'); 0 is the plain absolute error."""
+    collision: Literal["sum", "depth"] = "sum"
+    """Object-object collision: overlap summed over the separating axes (paper), or the
+    smallest one, which is how far the boxes must really move."""
+    duplicate_axes: bool = True
+    """Count parallel axes twice, as the paper's sum over six axes does."""
+    projection: Literal["edges", "iou"] = "edges"
+    """Reprojection error: difference of the four edges in radians, or 1 - IoU."""
+    variables: Literal["delta", "pixel", "metric"] = "metric"
+    """Unit of the direction variable: BFoV sizes (paper), pixels of a panorama 1024 wide
+    (release), or metres across the line of sight with the yaw in the world frame."""
+    relative_yaw_target: Literal["argmax", "mean"] = "argmax"
+    """The angle of the most probable bin (stop-gradient), or the circular mean of all bins."""
+    clearance: float = Field(0.0, ge=0)
+    """Metres by which boxes are held apart, so that contact does not end in penetration."""
+    solver: Literal["sgd", "adam"] = "adam"
+    steps: int = Field(100, ge=0)
+    learning_rate: float = Field(1.0, gt=0)
+    momentum: float = Field(0.9, ge=0, lt=1)
+    direction_gradient_scale: float = Field(1.0, gt=0)
+    """Factor on the gradient of the direction variable (the release: 1000)."""
+    safe: bool = False
+    """Keep the input rather than anything worse in energy, collisions or out-of-room volume."""
+
+    @staticmethod
+    def preset(name: str) -> "ArrangementSettings":
+        """Return the preset ``paper``, ``released`` or ``default``.
+
+        Raises:
+            ValueError: there is no preset of that name.
+        """
+        if name not in PRESETS:
+            raise ValueError(f"preset: found {name!r}, expected one of {sorted(PRESETS)}")
+        return PRESETS[name]
+
+
+_PAPER = ArrangementSettings(
+    name="paper",
+    label="binary",
+    inside_room_label="probability",
+    inside_room_on_touching=False,
+    observation_confidence=False,
+    reduction="sum",
+    loss_beta=0.0,
+    collision="sum",
+    duplicate_axes=True,
+    projection="iou",
+    variables="delta",
+    solver="sgd",
+    steps=100,
+    learning_rate=1.0,
+    momentum=0.9,
+)
+
+_RELEASED = ArrangementSettings(
+    name="released",
+    weights=TermWeights(
+        object_collision=0.1, touching=0.1, relative_yaw=0.01, relative_yaw_wall=0.1
+    ),
+    thresholds=Thresholds(
+        touching=0.07, touching_wall=0.18, on_floor=0.1, under_ceiling=0.007, inside_room=0.95
+    ),
+    label="confidence",
+    inside_room_label="confidence",
+    inside_room_on_touching=True,
+    observation_confidence=True,
+    reduction="mean",
+    loss_beta=1.0,
+    collision="sum",
+    duplicate_axes=True,
+    projection="edges",
+    variables="pixel",
+    solver="sgd",
+    steps=100,
+    learning_rate=1.0,
+    momentum=0.9,
+    direction_gradient_scale=1000.0,
+)
+
+_DEFAULT = ArrangementSettings(
+    name="default",
+    weights=TermWeights(
+        object_collision=2.0,
+        wall_collision=1.0,
+        floor_collision=2.0,
+        ceiling_collision=2.0,
+        relative_yaw=0.02,
+        relative_yaw_wall=0.05,
+        touching=0.2,
+        touching_wall=0.4,
+        on_floor=1.0,
+        under_ceiling=0.5,
+        farther_than=0.01,
+        direction=0.2,
+        distance=0.1,
+        size=0.5,
+        yaw=0.05,
+        reprojection=1.0,
+    ),
+    loss_beta=0.05,
+    collision="depth",
+    duplicate_axes=False,
+    projection="edges",
+    variables="metric",
+    clearance=0.004,
+    solver="adam",
+    steps=60,
+    learning_rate=0.05,
+    momentum=0.8,
+    safe=True,
+)
+
+PRESETS: dict[str, ArrangementSettings] = {
+    "paper": _PAPER,
+    "released": _RELEASED,
+    "default": _DEFAULT,
+}
+"""``paper``: plain sums and the paper's weights. ``released``: the authors' released reductions,
+weights and gradient scaling. ``default``: ours."""
