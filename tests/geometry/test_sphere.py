@@ -140,6 +140,14 @@ def test_deep_pano_context_pixels_are_half_a_pixel_further_and_latitudes_negated
     torch.testing.assert_close(lonlat_from_direction(direction)[:, 1], -lat_down)
 
 
+def test_the_poles_have_longitude_zero_whatever_the_signs_of_their_zeros() -> None:
+    zeros = [(x, y, z) for x in (0.0, -0.0) for y in (0.0, -0.0) for z in (1.0, -1.0, 0.0)]
+    lon, lat = lonlat_from_direction(torch.tensor(zeros)).unbind(-1)
+    assert bool((lon == 0).all())
+    assert float(lat[0]) == pytest.approx(math.pi / 2)
+    assert bool((lat[2::3] == 0).all())
+
+
 @few
 @given(longitudes, st.floats(-math.pi / 2, math.pi / 2))
 def test_the_turned_camera_is_a_rotation_that_looks_at_its_target(lon: float, lat: float) -> None:

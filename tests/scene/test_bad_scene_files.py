@@ -32,6 +32,7 @@ BAD_DOCUMENTS: list[tuple[str, Change, str, str]] = [
     ("true version", lambda d: d.update(version=True), "$.version: found True", "expected 1"),
     ("no version", lambda d: d.pop("version"), "$.version: found nothing", "expected 1"),
     ("feet", lambda d: d.update(units="feet, degrees"), "$.units", "metres, radians"),
+    ("other frame", lambda d: d.update(frame="y up"), "$.frame: found 'y up'", "+z up"),
     ("missing", lambda d: d.pop("layout"), "$.layout: found nothing", "required"),
     (
         "American spelling",
@@ -263,7 +264,7 @@ BAD_FILES: list[tuple[str, bytes, str]] = [
     ("blank", b" \n\n", "nothing in it"),
     ("truncated", MINIMAL[:-40].encode(), "truncated"),
     ("truncated in a key", MINIMAL[:30].encode(), "truncated"),
-    ("two documents", (MINIMAL + "{}").encode(), "line 11, column 2"),
+    ("two documents", (MINIMAL + "{}").encode(), "line 12, column 1"),
     ("comment", MINIMAL.replace("{", "{ // room", 1).encode(), "line 1, column 3"),
     ("not JSON", b"PK\x03\x04 zip", "line 1, column 1"),
     ("UTF-16", MINIMAL.encode("utf-16"), "UTF-8"),

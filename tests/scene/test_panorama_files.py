@@ -1,4 +1,5 @@
 import io
+import pickle
 import struct
 import zlib
 from pathlib import Path
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from panoscene.scene import Panorama, PanoramaError, read_panorama
+from panoscene.scene import Panorama, PanoramaError, Problem, SceneFormatError, read_panorama
 
 WIDTH, HEIGHT = 128, 64
 
@@ -260,3 +261,16 @@ def test_damage_gives_a_picture_or_a_panorama_error(
         return
     assert image.shape == (3, panorama.height, panorama.width)
     assert bool(((image >= 0) & (image <= 1)).all())
+
+
+def test_errors_cross_process_borders() -> None:
+    scene_error = SceneFormatError("a.json", [Problem("$.version", "2", "1")])
+    for error in (PanoramaError("a.png", "bad"), scene_error):
+        again = pickle.loads(pickle.dumps(error))  # noqa: S301
+        assert str(again) == str(error)
+        assert vars(again) == vars(error)
+
+
+def test_camera_height_is_checked(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="camera_height: expected metres above 0"):
+        read_panorama(tmp_path / "pano.png", camera_height=0.0)

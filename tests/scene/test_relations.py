@@ -228,3 +228,20 @@ def test_bad_parameters_are_refused(room: Layout) -> None:
         relations_from_boxes(box, room, tolerance=-0.1)
     with pytest.raises(ValueError, match=r"batch shape \(n,\), found \(\)"):
         relations_from_boxes(box[0], room)
+
+
+def test_bad_rooms_are_refused(room: Layout) -> None:
+    box = one_box(0.0, 0.0, 0.5, (1.0, 1.0, 1.0))
+    corners = room.floor_polygon
+    for polygon, message in [
+        (corners.flip(0), "clockwise"),
+        (corners[[0, 2, 1, 3]], "cross"),
+        (corners * math.nan, "not finite"),
+        (corners[:2], "2 corners"),
+    ]:
+        with pytest.raises(ValueError, match=f"layout.floor_polygon: .*{message}"):
+            relations_from_boxes(box, Layout(polygon))
+    with pytest.raises(ValueError, match="ceiling_height: expected more than the floor"):
+        relations_from_boxes(box, Layout(corners, 3.0, 2.0))
+    with pytest.raises(ValueError, match="camera_height: expected finite"):
+        relations_from_boxes(box, room, math.nan)

@@ -136,8 +136,8 @@ def test_bfov_stays_near_the_true_one(room: Scene) -> None:
 
 
 def test_layout_noise_moves_walls_along_their_normals() -> None:
-    for seed in range(20):
-        room = sample_room(np.random.default_rng(seed), objects=2)
+    for seed in range(10):
+        room = sample_room(np.random.default_rng(seed), objects=0)
         noisy = perturb_scene(room, np.random.default_rng(seed), PerturbNoise(layout=0.05))
         before, after = room.layout.floor_polygon, noisy.layout.floor_polygon
         assert polygon_problem(after) is None
@@ -148,7 +148,7 @@ def test_layout_noise_moves_walls_along_their_normals() -> None:
 
 
 def test_wild_layout_noise_still_gives_a_room_around_the_camera() -> None:
-    for seed in range(10):
+    for seed in range(6):
         room = sample_room(np.random.default_rng(seed), objects=0, corners=10)
         noisy = perturb_scene(room, np.random.default_rng(seed), PerturbNoise(layout=3.0))
         assert polygon_problem(noisy.layout.floor_polygon) is None

@@ -5,6 +5,7 @@ from panoscene.arrange._arrange import arrange as arrange
 from panoscene.arrange._arrange import arrange_scenes as arrange_scenes
 from panoscene.arrange._arrange import energy as energy
 from panoscene.arrange._arrange import optimise_boxes as optimise_boxes
+from panoscene.arrange._arrange import solver_states as solver_states
 from panoscene.arrange._batch import ArrangementBatch as ArrangementBatch
 from panoscene.arrange._batch import collate_scenes as collate_scenes
 from panoscene.arrange._certificate import Certificate as Certificate

@@ -1,7 +1,8 @@
 """Scenes in, repaired scenes and certificates out: the public face of the optimiser."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import torch
 from jaxtyping import Float
@@ -10,10 +11,15 @@ from torch import Tensor
 from panoscene.arrange._batch import ArrangementBatch, collate_scenes
 from panoscene.arrange._certificate import Certificate, Measures, measure
 from panoscene.arrange._energy import energy_terms
-from panoscene.arrange._kernel import make_kernel
-from panoscene.arrange._problem import Problem, boxes_from_variables, make_problem
+from panoscene.arrange._kernel import Kernel, make_kernel
+from panoscene.arrange._problem import (
+    Problem,
+    boxes_from_variables,
+    make_problem,
+    variables_from_boxes,
+)
 from panoscene.arrange._settings import ArrangementSettings
-from panoscene.arrange._solver import descend
+from panoscene.arrange._solver import descend, steps
 from panoscene.geometry import OrientedBoxes
 from panoscene.scene import Scene
 
@@ -122,20 +128,48 @@ def optimise_boxes(
 def energy(
     batch: ArrangementBatch,
     settings: ArrangementSettings,
+    *,
+    boxes: OrientedBoxes | None = None,
     weights: Float[Tensor, " terms"] | None = None,
 ) -> Float[Tensor, "scenes terms"]:
-    """Return the energy terms of the scenes as they stand, in the order of ``TERM_NAMES``."""
+    """Return the energy terms of each scene, in the order of ``TERM_NAMES``.
+
+    Args:
+        batch: scenes from ``collate_scenes``; their boxes are the observation.
+        settings: which energy.
+        boxes: boxes to judge by that observation instead of the observed ones, batch shape
+            (scenes, n).
+        weights: lambda of every term, instead of the settings'.
+    """
     problem = make_problem(batch, settings, weights)
-    return energy_terms(problem.start, problem)
+    x = problem.start if boxes is None else variables_from_boxes(boxes, problem)
+    return energy_terms(x, problem)
+
+
+def solver_states(
+    batch: ArrangementBatch, settings: ArrangementSettings
+) -> Iterator[tuple[int, OrientedBoxes]]:
+    """Yield step numbers from 1 and the boxes after each step, without ``safe`` and gradients."""
+    with torch.no_grad():
+        problem = make_problem(batch, settings)
+        kernel, start = _for_device(problem)
+        for number, x in enumerate(steps(start, kernel, settings), start=1):
+            yield number, boxes_from_variables(torch.as_tensor(x), problem)
+
+
+def _for_device(problem: Problem) -> tuple[Kernel, Any]:
+    """Return kernel and start values in the array library that suits the device."""
+    kernel = make_kernel(problem)
+    if problem.start.device.type != "cpu":
+        return kernel, problem.start
+    return kernel.numpy(), problem.start.numpy()
 
 
 def _descend(problem: Problem, keep: set[int]) -> tuple[Tensor, dict[int, Tensor]]:
     """Run the solver with the array library that suits the device."""
-    kernel = make_kernel(problem)
-    if problem.start.device.type != "cpu":
-        return descend(problem.start, kernel, problem.settings, keep)
-    final, kept = descend(problem.start.numpy(), kernel.numpy(), problem.settings, keep)
-    return torch.from_numpy(final), {step: torch.from_numpy(x) for step, x in kept.items()}
+    kernel, start = _for_device(problem)
+    final, kept = descend(start, kernel, problem.settings, keep)
+    return torch.as_tensor(final), {step: torch.as_tensor(x) for step, x in kept.items()}
 
 
 def _measure(variables: Tensor, problem: Problem) -> Measures:
@@ -152,9 +186,7 @@ class _Chosen:
     final_energy: Tensor
 
 
-def _choose(
-    problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Measures
-) -> _Chosen:
+def _choose(problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Measures) -> _Chosen:
     """Take the solution of each scene, or with ``safe`` the best acceptable state."""
     start = problem.start
     finite = torch.isfinite(final).all(0).all(-1)
@@ -164,10 +196,17 @@ def _choose(
     words = ["solved" if good else "diverged, input returned" for good in finite.tolist()]
     changed = finite.clone()
     if problem.settings.safe:
+        best = _settle(final, problem)
+        after = _measure(best, problem)
         accepted = _acceptable(after, before)
         words = ["solved" if good else "input returned" for good in accepted.tolist()]
-        candidates = [(f"state after {step} steps", kept[step]) for step in sorted(kept, reverse=True)]
-        candidates += [(f"{part:.0%} of the way", start + part * (final - start)) for part in _BLENDS]
+        candidates = [("solved", final)]
+        candidates += [
+            (f"state after {step} steps", kept[step]) for step in sorted(kept, reverse=True)
+        ]
+        candidates += [
+            (f"{part:.0%} of the way", start + part * (final - start)) for part in _BLENDS
+        ]
         for label, candidate in candidates:
             if bool(accepted.all()):
                 break
@@ -181,6 +220,18 @@ def _choose(
         changed = accepted
     changed = changed & (best != start).any(0).any(-1)
     return _Chosen(boxes_from_variables(best, problem), after, changed, words, final_energy)
+
+
+def _settle(variables: Tensor, problem: Problem) -> Tensor:
+    """Return the variables with boxes that stand within the clearance of the floor put onto it."""
+    boxes = boxes_from_variables(variables, problem)
+    bottom = boxes.centre[..., 2] - boxes.size[..., 2] / 2
+    gap = bottom - problem.batch.floor_height[:, None]
+    near = (gap.abs() <= 2 * problem.settings.clearance) & (problem.confidence.on_floor > 0)
+    drop = torch.stack([torch.zeros_like(gap), torch.zeros_like(gap), gap * near], -1)
+    on_floor = OrientedBoxes(boxes.centre - drop, boxes.size, boxes.yaw)
+    settled = variables_from_boxes(on_floor, problem)
+    return torch.where(near[None], settled, variables)
 
 
 def _acceptable(after: Measures, before: Measures) -> Tensor:

@@ -60,7 +60,8 @@ class ArrangementBatch:
 def collate_scenes(scenes: Sequence[Scene]) -> ArrangementBatch:
     """Return the scenes as one padded batch.
 
-    Relations that a scene does not carry are derived from its boxes and layout.
+    Relations that a scene does not carry are derived from its boxes and layout; an object then
+    belongs in the room if any of its lower corners is inside, since the boxes may be off.
 
     Raises:
         ValueError: no scenes, or a scene whose boxes cannot be arranged (NaN, infinite, or
@@ -73,7 +74,9 @@ def collate_scenes(scenes: Sequence[Scene]) -> ArrangementBatch:
     relations = [
         scene.relations
         if scene.relations is not None
-        else relations_from_boxes(scene.objects.boxes, scene.layout, scene.panorama.camera_height)
+        else relations_from_boxes(
+            scene.objects.boxes, scene.layout, scene.panorama.camera_height, inside="any_corner"
+        )
         for scene in scenes
     ]
     count = max(len(scene.objects.boxes) for scene in scenes)
@@ -145,7 +148,8 @@ def _check_scene(scene: Scene, number: int) -> None:
     boxes = scene.objects.boxes
     label = f"scene {number}" + (f" ({scene.name})" if scene.name else "")
     for field, values in (("centre", boxes.centre), ("size", boxes.size), ("yaw", boxes.yaw)):
-        bad = ~torch.isfinite(values.reshape(len(boxes), -1)).all(-1)
+        bad = ~torch.isfinite(values)
+        bad = bad.any(-1) if bad.ndim > 1 else bad
         if bool(bad.any()):
             first = int(bad.nonzero()[0, 0])
             raise ValueError(

@@ -122,9 +122,7 @@ def measure(
     above = boxes.centre[..., 2] + half - batch.ceiling_height[:, None]
     outside = torch.relu(torch.stack([aside, below, above]).amax(0)) * valid
     inside = (batch.inside_room >= 0.5).to(valid.dtype)
-    fraction = box_in_room_fraction(
-        boxes, batch.polygon, batch.floor_height, batch.ceiling_height
-    )
+    fraction = box_in_room_fraction(boxes, batch.polygon, batch.floor_height, batch.ceiling_height)
     volume = box_volume(boxes) * (1 - fraction) * valid
 
     def worst(values: Tensor) -> Tensor:

@@ -46,11 +46,12 @@ def _collision_errors(boxes: OrientedBoxes, problem: Problem) -> dict[str, Tenso
         kind=settings.collision,
     )
     wall = terms.wall_collision(boxes, batch.polygon, clearance=settings.clearance)
-    floor = terms.floor_collision(boxes, batch.floor_height)
-    ceiling = terms.ceiling_collision(boxes, batch.ceiling_height)
+    apart = settings.clearance
+    floor = terms.floor_collision(boxes, batch.floor_height, clearance=apart)
+    ceiling = terms.ceiling_collision(boxes, batch.ceiling_height, clearance=apart)
     if settings.reduction == "mean":  # the release averages over all eight corners
-        above = terms.floor_collision(boxes, batch.floor_height, upper=True)
-        below = terms.ceiling_collision(boxes, batch.ceiling_height, lower=True)
+        above = terms.floor_collision(boxes, batch.floor_height, upper=True, clearance=apart)
+        below = terms.ceiling_collision(boxes, batch.ceiling_height, lower=True, clearance=apart)
         floor = torch.stack([floor, above], -1).repeat_interleave(4, -1)
         ceiling = torch.stack([ceiling, below], -1).repeat_interleave(4, -1)
     return {
@@ -61,20 +62,20 @@ def _collision_errors(boxes: OrientedBoxes, problem: Problem) -> dict[str, Tenso
     }
 
 
-def _relation_errors(
-    boxes: OrientedBoxes, distance: Tensor, problem: Problem
-) -> dict[str, Tensor]:
+def _relation_errors(boxes: OrientedBoxes, distance: Tensor, problem: Problem) -> dict[str, Tensor]:
     batch, conf = problem.batch, problem.confidence
-    twice = problem.settings.duplicate_axes
+    twice, apart = problem.settings.duplicate_axes, problem.settings.clearance
     return {
         "relative_yaw": terms.relative_yaw(boxes, boxes, problem.yaw_target) * conf.relative_yaw,
         "relative_yaw_wall": terms.relative_yaw(boxes, batch.walls, problem.yaw_target_wall)
         * conf.relative_yaw_wall,
-        "touching": terms.touching(boxes, boxes, duplicate_axes=twice) * conf.touching,
-        "touching_wall": terms.touching(boxes, batch.walls, duplicate_axes=twice)
+        "touching": terms.touching(boxes, boxes, duplicate_axes=twice, clearance=apart)
+        * conf.touching,
+        "touching_wall": terms.touching(boxes, batch.walls, duplicate_axes=twice, clearance=apart)
         * conf.touching_wall,
-        "on_floor": terms.on_floor(boxes, batch.floor_height) * conf.on_floor,
-        "under_ceiling": terms.under_ceiling(boxes, batch.ceiling_height) * conf.under_ceiling,
+        "on_floor": terms.on_floor(boxes, batch.floor_height, clearance=apart) * conf.on_floor,
+        "under_ceiling": terms.under_ceiling(boxes, batch.ceiling_height, clearance=apart)
+        * conf.under_ceiling,
         "farther_than": terms.farther_than(distance) * conf.farther_than,
     }
 
@@ -93,5 +94,3 @@ def _observation_errors(
         "size": (error[4:] * conf.size).movedim(0, 1),
         "reprojection": image * conf.reprojection[..., None],
     }
-
-

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from panoscene.arrange._kernel import Kernel
-from panoscene.arrange._problem import BEHIND
+from panoscene.arrange._terms import BEHIND
 
 # a numpy array or a torch tensor; both have the operators and methods used here
 Array = Any
@@ -90,8 +90,14 @@ def _corner_forces(box: Array, k: Kernel) -> tuple[Array, Array]:
     )
 
 
-def _footprint(x: Array, y: Array, cos: Array, sin: Array, box: Array, k: Kernel) -> Array:
-    """Return the footprint corners, x and y each "scenes n 4", counter-clockwise."""
+def _footprint(
+    centre: tuple[Array, Array], axis: tuple[Array, Array], box: Array, k: Kernel
+) -> tuple[Array, Array]:
+    """Return the footprint corners, x and y each "scenes n 4", counter-clockwise.
+
+    ``axis`` is the cos and sin of the box's right side in the frame of ``centre``.
+    """
+    (x, y), (cos, sin) = centre, axis
     right_x, right_y = (cos * box[7])[..., None], (sin * box[7])[..., None]
     front_x, front_y = (sin * box[8])[..., None], (cos * box[8])[..., None]
     to_right, to_front = k.corner_sign[0, :4], k.corner_sign[1, :4]
@@ -104,7 +110,7 @@ def _footprint(x: Array, y: Array, cos: Array, sin: Array, box: Array, k: Kernel
 def _wall_force(box: Array, k: Kernel) -> tuple[Array, Array]:
     """Return dE/d(corner) of the wall collision [wc] for the footprint corners."""
     xp = k.xp
-    corner_x, corner_y = _footprint(box[0], box[1], box[3], box[5], box, k)
+    corner_x, corner_y = _footprint((box[0], box[1]), (box[3], box[5]), box, k)
     start_x, start_y, edge_x, edge_y, inverse, slant = k.edge
     from_x = corner_x[..., None] - start_x
     from_y = corner_y[..., None] - start_y
@@ -127,10 +133,9 @@ def _image_force(box: Array, k: Kernel) -> tuple[Array, Array]:
     """Return dE/d(corner) of the reprojection [bp] for the four corners that bound the view."""
     xp = k.xp
     sin_lon, cos_lon, sin_lat, cos_lat = k.turn
-    cos, sin = box[3] * cos_lon - box[5] * sin_lon, box[5] * cos_lon + box[3] * sin_lon
-    x0 = box[0] * cos_lon - box[1] * sin_lon
-    y0 = box[0] * sin_lon + box[1] * cos_lon
-    x, y = _footprint(x0, y0, cos, sin, box, k)
+    axis = box[3] * cos_lon - box[5] * sin_lon, box[5] * cos_lon + box[3] * sin_lon
+    centre = box[0] * cos_lon - box[1] * sin_lon, box[0] * sin_lon + box[1] * cos_lon
+    x, y = _footprint(centre, axis, box, k)
     z0 = box[2] - k.camera
     x, y = x[..., None, :], y[..., None, :]
     z = (z0[..., None] + box[11][..., None] * k.low_high)[..., None]
@@ -184,7 +189,9 @@ def _rectangle_slope(edge: Array, k: Kernel) -> Array:
     by_extent = common / (whole * whole) * xp.flip(outer, (-1,))
     at_high = by_inner * (high < target_high) + by_extent
     at_low = -by_inner * (low > target_low) - by_extent
-    return k.reprojection_gain * xp.stack([at_high, at_low], -1).reshape(edge.shape)
+    error = 1 - common / whole
+    gain = k.reprojection_gain * xp.minimum(error * k.reprojection_slope, k.one)
+    return gain * xp.stack([at_high, at_low], -1).reshape(edge.shape)
 
 
 def _height_gradient(box: Array, k: Kernel) -> tuple[Array, Array]:
@@ -196,7 +203,7 @@ def _height_gradient(box: Array, k: Kernel) -> tuple[Array, Array]:
 
 
 def _pair_gradient(box: Array, distance: Array, k: Kernel) -> tuple[Array, ...]:
-    """Return rows (xy, z, half xy, half z, yaw) of the pair terms [oc, oa, rr], and distance [rd]."""
+    """Return rows (xy, z, half xy, half z, yaw) of [oc, oa, rr], and dE/d(distance) of [rd]."""
     xp = k.xp
     subject = box[..., None]
     other = xp.concatenate([box, k.walls], -1)[:, :, None, :]
@@ -262,9 +269,10 @@ def _collision_push(margin: Array, k: Kernel) -> Array:
 def _touching_push(margin: Array, k: Kernel) -> Array:
     """Return dE/d(margin) of the contact relations, "5 scenes n m"."""
     xp = k.xp
-    apart = xp.maximum(-margin, k.zero) * k.axis_weight
+    gap = -margin - k.clearance
+    apart = xp.maximum(gap, k.zero) * k.axis_weight
     push = k.touching_gain * xp.minimum(apart.sum(0) * k.touching_slope, k.one)
-    return -push * k.axis_weight * (margin < 0)
+    return -push * k.axis_weight * (gap > 0)
 
 
 def _yaw_push(yaw: Array, other: Array, k: Kernel) -> Array:

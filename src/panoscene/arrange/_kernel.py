@@ -154,7 +154,9 @@ def make_kernel(problem: Problem) -> Kernel:
         ]
     )
     floor, ceiling = floor * valid, ceiling * valid
-    observation = torch.stack([valid, valid, conf.distance, conf.yaw, conf.size, conf.size, conf.size])
+    observation = torch.stack(
+        [valid, valid, conf.distance, conf.yaw, conf.size, conf.size, conf.size]
+    )
     observation_scale = torch.stack(
         [
             single("direction", valid),
@@ -171,6 +173,7 @@ def make_kernel(problem: Problem) -> Kernel:
     table = torch.tensor([_CORNER_X, _CORNER_Y], dtype=one.dtype, device=one.device)
     corner_sign = torch.stack([table[0][sign[0]], table[1][sign[1]], sign[2] * 2.0 - 1.0])
     scenes, n = batch.valid.shape
+    near = settings.clearance / 2
     m = batch.polygon.shape[1]
     count = torch.arange(scenes * n * 4, device=one.device)
     return Kernel(
@@ -207,7 +210,13 @@ def make_kernel(problem: Problem) -> Kernel:
         )[:, :, None, None, :],
         wall_slope=(conf.inside_room / beta)[..., None],
         wall_gain=(2 * single("wall_collision", conf.inside_room))[..., None],
-        height_offset=torch.stack([floor, -ceiling, -floor, ceiling, floor, -ceiling]),
+        height_offset=torch.stack(
+            [
+                *(floor + near, near - ceiling),
+                *(-floor - settings.clearance, ceiling - settings.clearance),
+                *(floor + near, near - ceiling),
+            ]
+        ),
         height_z=one.new_tensor([-1, 1, 1, -1, -1, 1]).view(6, 1, 1),
         height_half=one.new_tensor([1, 1, -1, -1, -1, -1]).view(6, 1, 1),
         height_slope=height_weight / beta,

@@ -17,8 +17,6 @@ SMALLEST_BETA = 1e-9
 """Stands for the plain absolute error."""
 PIXEL_WIDTH = 1024
 """Width of the panorama in whose pixels the release measures directions."""
-BEHIND = 0.75 * math.pi
-"""A box with a corner farther than this from the BFoV's centre has no rectangle to compare."""
 WIDEST_BFOV = 2.6
 """Radians; the rectangle of a wider object says nothing, so it is not compared."""
 
@@ -97,7 +95,7 @@ def make_problem(
 
 
 def boxes_from_variables(variables: Float[Tensor, "7 scenes n"], problem: Problem) -> OrientedBoxes:
-    """Return the world boxes of the optimiser's variables (facts of the paper's Sec. 3.1)."""
+    """Return the world boxes of the optimiser's variables (parametrisation of Sec. 3.1)."""
     lon, lat = problem.direction_origin + problem.direction_scale * variables[:2]
     distance = variables[2]
     horizontal = distance * torch.cos(lat)
@@ -108,19 +106,38 @@ def boxes_from_variables(variables: Float[Tensor, "7 scenes n"], problem: Proble
     return OrientedBoxes(centre, size, wrap_angle(yaw))
 
 
-def _variables(
-    batch: ArrangementBatch, settings: ArrangementSettings
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Return start values, scale and origin of the variables."""
-    x, y, z = batch.boxes.centre.unbind(-1)
+def variables_from_boxes(boxes: OrientedBoxes, problem: Problem) -> Float[Tensor, "7 scenes n"]:
+    """Return the variables of other boxes in the same problem: its inverse, nearest to the start.
+
+    Angles are unwrapped to lie within half a turn of those of the start.
+    """
+    lonlat, distance = _view(boxes, problem.batch)
+    start = problem.start
+    start_lonlat = problem.direction_origin + problem.direction_scale * start[:2]
+    direction = start[:2] + wrap_angle(lonlat - start_lonlat) / problem.direction_scale
+    turn = start_lonlat[0] + wrap_angle(lonlat - start_lonlat)[0] if problem.view_relative else 0.0
+    yaw = start[3] + wrap_angle(-boxes.yaw - turn - start[3])
+    size = boxes.size.movedim(-1, 0)
+    return torch.cat([direction, torch.stack([distance, yaw]), size])
+
+
+def _view(boxes: OrientedBoxes, batch: ArrangementBatch) -> tuple[Tensor, Tensor]:
+    """Return lon and lat, "2 scenes n", and distance of the centres from the camera."""
+    x, y, z = boxes.centre.unbind(-1)
     z = z - batch.camera_height[:, None]
     # a centre exactly over the camera has no lon; the offset keeps the gradient finite
     y = torch.where((x.abs() + y.abs()) < 1e-9, y + 1e-9, y)
     horizontal = torch.sqrt(x * x + y * y)
     distance = torch.sqrt(horizontal * horizontal + z * z)
-    lon = torch.atan2(x, y)
-    lat = torch.atan2(z, horizontal)
-    lonlat = torch.stack([lon, lat])
+    return torch.stack([torch.atan2(x, y), torch.atan2(z, horizontal)]), distance
+
+
+def _variables(
+    batch: ArrangementBatch, settings: ArrangementSettings
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return start values, scale and origin of the variables."""
+    lonlat, distance = _view(batch.boxes, batch)
+    lon, lat = lonlat
     if settings.variables == "delta":
         scale = -batch.bfov[..., 2:].movedim(-1, 0).clamp(min=1e-3)
         origin = batch.bfov[..., :2].movedim(-1, 0)
@@ -128,7 +145,7 @@ def _variables(
         origin = lonlat - direction * scale
     elif settings.variables == "pixel":
         step = 2 * math.pi / PIXEL_WIDTH
-        signs = torch.tensor([step, -step], dtype=x.dtype, device=x.device)
+        signs = lonlat.new_tensor([step, -step])
         scale = signs[:, None, None].expand_as(lonlat)
         origin = torch.zeros_like(lonlat)
         direction = lonlat / scale

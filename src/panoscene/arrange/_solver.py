@@ -1,7 +1,7 @@
 """Gradient descent on the arrangement: plain momentum (paper) and our damped adaptive steps."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from panoscene.arrange._gradient import energy_gradient
@@ -29,16 +29,21 @@ def descend(
         settings: solver, number of steps, learning rate, momentum.
         keep: numbers of steps after which the variables are kept; 0 is the start.
     """
-    run = _sgd if settings.solver == "sgd" else _adam
     kept = {0: start} if 0 in keep else {}
     x = start
-    for step, x in enumerate(run(start, kernel, settings), start=1):
+    for step, x in enumerate(steps(start, kernel, settings), start=1):
         if step in keep:
             kept[step] = x
     return x, kept
 
 
-def _sgd(x: Array, kernel: Kernel, settings: ArrangementSettings):
+def steps(start: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[Array]:
+    """Yield the variables after each step."""
+    run = _sgd if settings.solver == "sgd" else _adam
+    return run(start, kernel, settings)
+
+
+def _sgd(x: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[Array]:
     """Yield the variables after every step of momentum descent (paper, Sec. 3.3)."""
     direction = settings.direction_gradient_scale
     velocity = kernel.xp.zeros_like(x)
@@ -51,7 +56,7 @@ def _sgd(x: Array, kernel: Kernel, settings: ArrangementSettings):
         yield x
 
 
-def _adam(x: Array, kernel: Kernel, settings: ArrangementSettings):
+def _adam(x: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[Array]:
     """Yield the variables after every adaptive step; the step length falls like half a cosine."""
     xp = kernel.xp
     mean = xp.zeros_like(x)

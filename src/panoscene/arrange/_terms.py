@@ -7,7 +7,6 @@ bin of a relative yaw is the most probable. Batch axes are the scenes.
 Source: DeepPanoContext, Sec. 3.3; the letters in brackets are the paper's.
 """
 
-import math
 from typing import Literal
 
 import torch
@@ -23,8 +22,8 @@ from panoscene.geometry import (
     wrap_angle,
 )
 
-BEHIND = 0.75 * math.pi
-"""A box with a corner farther than this from the BFoV's centre has no rectangle to compare."""
+BEHIND = 2.36
+"""Radians: a box with a corner farther than this to the side has no rectangle to compare."""
 
 
 def _pair_margins(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*batch n m 6"]:
@@ -51,9 +50,7 @@ def object_collision(
     """
     margin = _pair_margins(boxes, boxes) + clearance
     least = margin.amin(-1)
-    colliding = (least > 0) & ~torch.eye(
-        boxes.yaw.shape[-1], dtype=torch.bool, device=least.device
-    )
+    colliding = (least > 0) & ~torch.eye(boxes.yaw.shape[-1], dtype=torch.bool, device=least.device)
     overlap = least if kind == "depth" else margin.sum(-1) * (1.0 if duplicate_axes else 0.5)
     return torch.where(colliding, overlap, 0.0)
 
@@ -72,35 +69,50 @@ def wall_collision(
 
 
 def floor_collision(
-    boxes: OrientedBoxes, floor_height: Float[Tensor, "*batch"], *, upper: bool = False
+    boxes: OrientedBoxes,
+    floor_height: Float[Tensor, "*batch"],
+    *,
+    upper: bool = False,
+    clearance: float = 0.0,
 ) -> Float[Tensor, "*batch n"]:
     """Return how far the lower surface is below the floor, in metres [fc].
 
-    ``upper`` asks for the upper surface instead; the release averages over both.
+    ``upper`` asks for the upper surface instead; the release averages over both. Surfaces nearer
+    to the floor than half the clearance count too.
     """
     side = boxes.size[..., 2] / 2 * (1 if upper else -1)
-    return torch.relu(floor_height[..., None] - boxes.centre[..., 2] - side)
+    return torch.relu(floor_height[..., None] - boxes.centre[..., 2] - side + clearance / 2)
 
 
 def ceiling_collision(
-    boxes: OrientedBoxes, ceiling_height: Float[Tensor, "*batch"], *, lower: bool = False
+    boxes: OrientedBoxes,
+    ceiling_height: Float[Tensor, "*batch"],
+    *,
+    lower: bool = False,
+    clearance: float = 0.0,
 ) -> Float[Tensor, "*batch n"]:
     """Return how far the upper surface is above the ceiling, in metres [cc].
 
-    ``lower`` asks for the lower surface instead; the release averages over both.
+    ``lower`` asks for the lower surface instead; the release averages over both. Surfaces nearer
+    to the ceiling than half the clearance count too.
     """
     side = boxes.size[..., 2] / 2 * (-1 if lower else 1)
-    return torch.relu(boxes.centre[..., 2] + side - ceiling_height[..., None])
+    return torch.relu(boxes.centre[..., 2] + side - ceiling_height[..., None] + clearance / 2)
 
 
 def touching(
-    boxes: OrientedBoxes, others: OrientedBoxes, *, duplicate_axes: bool = True
+    boxes: OrientedBoxes,
+    others: OrientedBoxes,
+    *,
+    duplicate_axes: bool = True,
+    clearance: float = 0.0,
 ) -> Float[Tensor, "*batch n m"]:
     """Return the gap summed over the axes without overlap, in metres [oa].
 
-    ``others`` are the objects themselves (then the diagonal is 0) or the wall cuboids.
+    ``others`` are the objects themselves (then the diagonal is 0) or the wall cuboids. A gap of
+    up to the clearance is contact.
     """
-    gap = torch.relu(-_pair_margins(boxes, others)).sum(-1)
+    gap = torch.relu(-_pair_margins(boxes, others) - clearance).sum(-1)
     return gap if duplicate_axes else gap * 0.5
 
 
@@ -115,17 +127,25 @@ def relative_yaw(
 
 
 def on_floor(
-    boxes: OrientedBoxes, floor_height: Float[Tensor, "*batch"]
+    boxes: OrientedBoxes, floor_height: Float[Tensor, "*batch"], *, clearance: float = 0.0
 ) -> Float[Tensor, "*batch n"]:
-    """Return the gap between the floor and the lower surface in metres [fa]."""
-    return torch.relu(boxes.centre[..., 2] - boxes.size[..., 2] / 2 - floor_height[..., None])
+    """Return the gap between the floor and the lower surface in metres [fa].
+
+    A gap of up to the clearance is contact.
+    """
+    gap = boxes.centre[..., 2] - boxes.size[..., 2] / 2 - floor_height[..., None]
+    return torch.relu(gap - clearance)
 
 
 def under_ceiling(
-    boxes: OrientedBoxes, ceiling_height: Float[Tensor, "*batch"]
+    boxes: OrientedBoxes, ceiling_height: Float[Tensor, "*batch"], *, clearance: float = 0.0
 ) -> Float[Tensor, "*batch n"]:
-    """Return the gap between the ceiling and the upper surface in metres [ca]."""
-    return torch.relu(ceiling_height[..., None] - boxes.centre[..., 2] - boxes.size[..., 2] / 2)
+    """Return the gap between the ceiling and the upper surface in metres [ca].
+
+    A gap of up to the clearance is contact.
+    """
+    gap = ceiling_height[..., None] - boxes.centre[..., 2] - boxes.size[..., 2] / 2
+    return torch.relu(gap - clearance)
 
 
 def farther_than(distance: Float[Tensor, "*batch n"]) -> Float[Tensor, "*batch n n"]:
@@ -139,7 +159,7 @@ def farther_than(distance: Float[Tensor, "*batch n"]) -> Float[Tensor, "*batch n
 def observation(
     variables: Float[Tensor, "*batch"], start: Float[Tensor, "*batch"]
 ) -> Float[Tensor, "*batch"]:
-    """Return the absolute difference from the estimate, unit of the variable [delta, d, s, theta]."""
+    """Return the absolute difference from the estimate [delta, d, s, theta], same unit."""
     return (variables - start).abs()
 
 

@@ -2,10 +2,12 @@
 
 from panoscene.geometry._angles import wrap_angle as wrap_angle
 from panoscene.geometry._bfov import bfov_area as bfov_area
+from panoscene.geometry._bfov import bfov_candidates as bfov_candidates
 from panoscene.geometry._bfov import bfov_contains as bfov_contains
 from panoscene.geometry._bfov import bfov_from_contour as bfov_from_contour
 from panoscene.geometry._bfov import bfov_from_directions as bfov_from_directions
 from panoscene.geometry._bfov import bfov_from_mask as bfov_from_mask
+from panoscene.geometry._bfov import smallest_bfov as smallest_bfov
 from panoscene.geometry._bfov_overlap import bfov_intersection_area as bfov_intersection_area
 from panoscene.geometry._bfov_overlap import bfov_iou as bfov_iou
 from panoscene.geometry._bfov_overlap import bfov_nms as bfov_nms
@@ -60,7 +62,9 @@ from panoscene.geometry._polygon import polygon_contains as polygon_contains
 from panoscene.geometry._polygon import signed_distance_to_polygon as signed_distance_to_polygon
 from panoscene.geometry._polygon_validity import COINCIDENT as COINCIDENT
 from panoscene.geometry._polygon_validity import is_manhattan as is_manhattan
-from panoscene.geometry._polygon_validity import polygon_intersection_area as polygon_intersection_area
+from panoscene.geometry._polygon_validity import (
+    polygon_intersection_area as polygon_intersection_area,
+)
 from panoscene.geometry._polygon_validity import polygon_iou as polygon_iou
 from panoscene.geometry._polygon_validity import polygon_problem as polygon_problem
 from panoscene.geometry._resample import panorama_directions as panorama_directions
@@ -84,5 +88,7 @@ from panoscene.geometry._sphere import pixel_from_lonlat as pixel_from_lonlat
 from panoscene.geometry._tangent_box import MAX_TANGENT_FOV as MAX_TANGENT_FOV
 from panoscene.geometry._tangent_box import bfov_from_tangent_box as bfov_from_tangent_box
 from panoscene.geometry._tangent_box import tangent_box_from_bfov as tangent_box_from_bfov
-from panoscene.geometry._tangent_box import tangent_box_from_directions as tangent_box_from_directions
+from panoscene.geometry._tangent_box import (
+    tangent_box_from_directions as tangent_box_from_directions,
+)
 from panoscene.geometry._tangent_box import tangent_points as tangent_points

@@ -16,10 +16,11 @@ def wrap_angle(angle: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
         - pi itself becomes -pi, so that every direction has exactly one number
 
     Example:
-        >>> wrap_angle(torch.tensor([0.0, 3.5])).tolist()
-        [0.0, -2.7831850051879883]
+        >>> wrap_angle(torch.tensor([0.0, 3.5]))
+        tensor([ 0.0000, -2.7832])
     """
     turns = torch.floor(angle.detach() / (2 * math.pi) + 0.5)
     wrapped = angle - turns * (2 * math.pi)
-    # float rounding can leave the result exactly at the open end
-    return torch.where(wrapped >= math.pi, wrapped - 2 * math.pi, wrapped)
+    # rounding can leave the result at the open end, or just beyond the closed one
+    wrapped = torch.where(wrapped >= math.pi, wrapped - 2 * math.pi, wrapped)
+    return torch.where(wrapped < -math.pi, wrapped - wrapped.detach() - math.pi, wrapped)

@@ -248,8 +248,8 @@ def _starting_centres(
     ordered = lon.sort(-1).values
     gap = torch.cat((ordered[..., 1:], ordered[..., :1] + 2 * math.pi), -1) - ordered
     opposite = ordered + gap / 2 + math.pi
-    # of equal gaps, take the one behind the mean direction: that choice turns with the points
-    preference = gap + 1e-4 * (opposite - mean[..., :1]).cos()
+    # of about equal gaps, take the one behind the mean direction: that choice turns with the points
+    preference = gap + 1e-2 * (opposite - mean[..., :1]).cos()
     widest = preference.argmax(-1, keepdim=True)
     middle = wrap_angle(opposite.gather(-1, widest).squeeze(-1))
     level = torch.zeros_like(middle)
@@ -338,16 +338,20 @@ def _grown_over_columns(
     between, where the meridian passes nearest to the turned pole. That only happens to objects
     that reach far around the sphere. A width within two steps of the full circle is made full.
     """
-    low, high = torch.where(occupied, span, span.new_tensor([10.0, -10.0])[:, *[None] * lon.ndim])
-    turn = lon.unsqueeze(-2) - fits[..., :1]
-    sin_lat, cos_lat = fits[..., 1:2].sin(), fits[..., 1:2].cos()
-    across = -sin_lat * turn.cos()  # sin lat' = cos_lat sin t + across cos t along the column
-    peak = torch.atan2(cos_lat, across)  # the largest lat'; half a turn away the smallest
-    dip = torch.where(peak > 0, peak - math.pi, peak + math.pi)
-    low, high = low.unsqueeze(-2), high.unsqueeze(-2)
-    inside = ((peak >= low) & (peak <= high)) | ((dip >= low) & (dip <= high))
-    reach = torch.atan2(torch.hypot(cos_lat, across), (sin_lat * turn.sin()).abs())
-    height = torch.maximum(fits[..., 3], 2 * torch.where(inside, reach, 0.0).amax(-1))
+    lon_low_high = torch.stack((lon, *span)).unsqueeze(-2)
+    (cos_lon, *cos_ends), (sin_lon, *sin_ends) = lon_low_high.cos(), lon_low_high.sin()
+    centre_sin, centre_cos = (
+        fits[..., None, :2].sin().unbind(-1),
+        fits[..., None, :2].cos().unbind(-1),
+    )
+    cos_turn = cos_lon * centre_cos[0] + sin_lon * centre_sin[0]
+    sin_turn = sin_lon * centre_cos[0] - cos_lon * centre_sin[0]
+    # at lat t of a column sin lat' = centre_cos[1] sin t + across cos t: is its slope zero inside?
+    across = -centre_sin[1] * cos_turn
+    slopes = [centre_cos[1] * c - across * s for c, s in zip(cos_ends, sin_ends, strict=True)]
+    bulging = occupied.unsqueeze(-2) & (slopes[0] * slopes[1] <= 0)
+    rest = torch.where(bulging, (centre_sin[1] * sin_turn).abs(), 1.0).amin(-1)  # cos of the peak
+    height = torch.maximum(fits[..., 3], 2 * torch.atan2((1 - rest.square()).sqrt(), rest))
     full = fits[..., 2] > 2 * math.pi * (1 - 2 / lon.shape[-1])
     width = torch.where(full, 2 * math.pi, fits[..., 2])
     return torch.stack((fits[..., 0], fits[..., 1], width, height), dim=-1)

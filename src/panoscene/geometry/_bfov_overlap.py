@@ -122,9 +122,10 @@ def bfov_union(
 ) -> Float[Tensor, "*batch 4"]:
     """Return a small BFoV that contains all regions of each batch entry.
 
-    The fit is that of bfov_from_directions, to points on the borders: regions stick out of the
-    result by 1e-3 of their extent at most. The largest region is returned unchanged when it
-    contains the others. Two halves of an object cut at the seam become one BFoV around both.
+    The fit is that of bfov_from_directions, to dense points on the borders. Regions stick out of
+    the result by less than 1e-4 rad up to the size of a large object, and by 0.03 rad at most
+    beyond a hemisphere. The largest region is returned unchanged when it contains the others. Two
+    halves of an object cut at the seam become one BFoV around both.
 
     Args:
         bfov: (lon, lat, width, height) in radians.

@@ -109,7 +109,8 @@ def corner_visible(
     """Return whether the camera sees each corner: no wall crosses the line of sight to it.
 
     Convention:
-        - walls that start or end at the corner do not hide it, nor does a wall seen edge-on
+        - walls that start or end at the corner do not hide it
+        - a line of sight that exactly grazes another corner may count either way
         - padding by repeated corners changes nothing
         - from outside the room, the corners that are seen from outside
 

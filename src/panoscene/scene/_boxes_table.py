@@ -163,7 +163,8 @@ def scene_from_boxes(
             f"camera_height: expected {panorama.camera_height} as in panorama, "
             f"found {camera_height}"
         )
-    relations = relations_from_boxes(objects.boxes, layout, camera_height)
+    # boxes from elsewhere may be off, so one corner inside is enough to belong in the room
+    relations = relations_from_boxes(objects.boxes, layout, camera_height, inside="any_corner")
     return Scene(panorama, layout, objects, relations, name)
 
 

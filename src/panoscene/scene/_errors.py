@@ -42,6 +42,10 @@ class SceneFormatError(ValueError):
         text = lines[0] if len(lines) == 1 else "".join(f"\n  {line}" for line in lines)
         super().__init__(f"{self.file}: {text}")
 
+    def __reduce__(self) -> tuple[type, tuple[str, tuple[Problem, ...]]]:
+        """Let worker processes hand the error on."""
+        return type(self), (self.file, self.problems)
+
 
 class PanoramaError(ValueError):
     """A picture cannot be used as an equirectangular panorama.
@@ -55,6 +59,10 @@ class PanoramaError(ValueError):
         self.file = os.fspath(file)
         self.reason = reason
         super().__init__(f"{self.file}: {reason}")
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        """Let worker processes hand the error on."""
+        return type(self), (self.file, self.reason)
 
 
 def shown(value: object, length: int = 60) -> str:

@@ -1,5 +1,6 @@
 """Panorama pictures: from a file of any common kind to RGB floats, or a clear refusal."""
 
+import math
 import os
 import struct
 import warnings
@@ -46,7 +47,10 @@ def read_panorama(
     Raises:
         PanoramaError: The file is missing, damaged, truncated or not of a known format, or the
             picture is not 2:1, below 64 x 32, or above 150 million pixels.
+        ValueError: The camera height is not a positive number.
     """
+    if not 0 < camera_height < math.inf:
+        raise ValueError(f"camera_height: expected metres above 0, found {camera_height}")
     file = os.fspath(path)
     with warnings.catch_warnings():
         # Pillow warns about large pictures and odd metadata; here both are errors or harmless
@@ -54,7 +58,7 @@ def read_panorama(
         try:
             with Image.open(path, formats=FORMATS) as picture:
                 _check_size(_upright_size(picture), file)
-                array = _rgb(picture, file)
+                image = _rgb(picture, file)
         except PanoramaError:
             raise
         except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
@@ -68,7 +72,6 @@ def read_panorama(
             raise PanoramaError(file, reason) from None
         except _DAMAGE as error:
             raise PanoramaError(file, f"the picture is damaged or truncated: {error}") from error
-    image = torch.as_tensor(array).permute(2, 0, 1).contiguous()
     height, width = image.shape[1:]
     return image, Panorama(width, height, camera_height, Path(file).name)
 
@@ -96,22 +99,24 @@ def _too_large(found: str) -> str:
     return f"found {found} pixels, expected at most {MAX_PIXELS // 1_000_000} million"
 
 
-def _rgb(picture: Image.Image, file: str) -> Float[np.ndarray, "height width 3"]:
+def _rgb(picture: Image.Image, file: str) -> Float[Tensor, "3 height width"]:
     picture = ImageOps.exif_transpose(picture)
     if picture.mode.startswith("I") or picture.mode == "F":
         return _grey(picture, file)
     if picture.has_transparency_data:
         seen = picture.convert("RGBA")
         picture = Image.alpha_composite(Image.new("RGBA", seen.size, (0, 0, 0, 255)), seen)
-    array = np.asarray(picture.convert("RGB"))
-    return array.astype(np.float32) / np.float32(255)
+    # bytes are reordered before they become four times as large
+    pixels = torch.as_tensor(np.array(picture.convert("RGB"))).permute(2, 0, 1).contiguous()
+    return pixels.float().div_(255)
 
 
-def _grey(picture: Image.Image, file: str) -> Float[np.ndarray, "height width 3"]:
+def _grey(picture: Image.Image, file: str) -> Float[Tensor, "3 height width"]:
     """Return greyscale of more than 8 bits; wide integers hold 16-bit values in practice."""
-    array = np.asarray(picture).astype(np.float32)
+    values = torch.as_tensor(np.array(picture).astype(np.float32))
     largest = 1.0 if picture.mode == "F" else 65535.0
-    if not (array.min() >= 0 and array.max() <= largest):
-        found = f"values from {array.min():g} to {array.max():g}"
-        raise PanoramaError(file, f"found {found}, expected 0 to {largest:g}")
-    return np.repeat((array / np.float32(largest))[:, :, None], 3, axis=2)
+    low, high = float(values.min()), float(values.max())
+    if not (low >= 0 and high <= largest):
+        reason = f"found values from {low:g} to {high:g}, expected 0 to {largest:g}"
+        raise PanoramaError(file, reason)
+    return (values / largest).repeat(3, 1, 1)

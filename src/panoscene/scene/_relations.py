@@ -12,6 +12,7 @@ from panoscene.geometry import (
     box_footprint,
     boxes_collide,
     footprint_area_in_polygon,
+    polygon_problem,
     signed_distance_to_polygon,
     wall_boxes,
     wrap_angle,
@@ -63,7 +64,8 @@ def relations_from_boxes(
 
     Raises:
         ValueError: The boxes are not n boxes, or hold a non-finite number or a size that is not
-            positive, or a tolerance is negative, or ``inside`` is unknown.
+            positive, or a tolerance is negative, or ``inside`` is unknown; or the floor polygon is
+            not simple and counter-clockwise, or the heights are not finite.
 
     Source: paper, Sec. 3.2 (relation estimation); tolerances of the labels in the release.
 
@@ -83,6 +85,7 @@ def relations_from_boxes(
         "wall_thickness": wall_thickness,
     }
     _check(boxes, tolerances)
+    _check_room(layout, camera_height)
     layout_polygon = layout.floor_polygon.to(boxes.centre)
     walls = wall_boxes(layout_polygon, layout.floor_height, layout.ceiling_height, wall_thickness)
     if inside == "full":
@@ -170,3 +173,19 @@ def _check(boxes: OrientedBoxes, tolerances: dict[str, float]) -> None:
     for name, value in tolerances.items():
         if not (math.isfinite(value) and value >= 0):
             raise ValueError(f"{name}: expected metres of at least 0, found {value}")
+
+
+def _check_room(layout: Layout, camera_height: float) -> None:
+    problem = polygon_problem(layout.floor_polygon)
+    if problem is not None:
+        raise ValueError(
+            "layout.floor_polygon: expected a simple polygon, counter-clockwise from above, "
+            f"found {problem}"
+        )
+    if not -math.inf < layout.floor_height < layout.ceiling_height < math.inf:
+        raise ValueError(
+            f"layout.ceiling_height: expected more than the floor's {layout.floor_height}, "
+            f"found {layout.ceiling_height}"
+        )
+    if not math.isfinite(camera_height):
+        raise ValueError(f"camera_height: expected finite metres, found {camera_height}")

@@ -13,10 +13,7 @@ from ._categories import CATEGORIES, category_index
 SCHEMA_NAME = "panoscene/scene"
 SCHEMA_VERSION = 1
 UNITS = "metres, radians"
-FRAME = (
-    "right-handed, +z up; origin on the floor under the camera; "
-    "+y towards the panorama's centre column, +x to its right"
-)
+FRAME = "right-handed, +z up, origin on the floor under the camera, +y to the centre column"
 YAW_BINS_DEG = ("-180", "-135", "-90", "-45", "0", "45", "90", "135")
 
 
@@ -191,7 +188,9 @@ class SceneModel(Model):
     """Version of this format."""
     units: Literal["metres, radians"] = UNITS
     """Units of every number, unless a name ends in ``_deg`` (degrees)."""
-    frame: Annotated[str, WithJsonSchema({"type": "string", "const": FRAME})] = FRAME
+    frame: Literal[
+        "right-handed, +z up, origin on the floor under the camera, +y to the centre column"
+    ] = FRAME
     """The world frame."""
     name: str = ""
     """Name of the scene."""

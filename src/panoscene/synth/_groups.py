@@ -82,7 +82,7 @@ def television(room: Furnishing) -> Piece | None:
 
 def dining(room: Furnishing) -> Piece | None:
     """Add a free-standing table with chairs that face it."""
-    table = room.put_free("table", surround=0.65)
+    table = room.put_free("table", surround=0.72)
     if table is None:
         return None
     seats = max(1, int(table.size[0] / 0.62))
@@ -150,7 +150,7 @@ def cabinet(room: Furnishing) -> Piece | None:
 
 def storage(room: Furnishing) -> Piece | None:
     """Add a cabinet, or one of the rarer pieces that stand at walls of living rooms."""
-    name = _pick(room, "cabinet", "cabinet", "console_table", "piano", "grandfather_clock")
+    name = _pick(room, *["cabinet"] * 6, "console_table", "piano", "grandfather_clock")
     if name == "cabinet":
         return cabinet(room)
     placed = room.put_at_wall(name, access=0.6, corner=0.4)
@@ -276,24 +276,23 @@ def _beside(
 
 
 def _chair(room: Furnishing, table: Piece, name: str, facing: float, along: float) -> None:
-    """Put a chair at one side of a table, facing it.
+    """Put a chair at one side of a table, facing it; close to it and straight if it must be.
 
     ``facing`` is the chair's yaw relative to the table: 0 behind the table, pi in front of it,
     +pi/2 at its right end, -pi/2 at its left end; ``along`` the metres along that side.
     """
     size = room.sample_size(name)
     turn = float(room.rng.choice([0.0, room.rng.uniform(-0.25, 0.25)]))
-    reach = (abs(np.cos(turn)) * size[1] + abs(np.sin(turn)) * size[0]) / 2
     gap = float(room.rng.choice([0.0, room.rng.uniform(0.02, 0.15)]))
     at_end = abs(abs(facing) - np.pi / 2) < 0.1
-    away = table.size[0 if at_end else 1] / 2 + gap + reach
-    # the chair stands opposite to where it looks: its front is (-sin, cos) of ``facing``
-    right, front = np.sin(facing) * away, -np.cos(facing) * away
-    if at_end:
-        front += along
-    else:
-        right += along
-    room.put_near(name, table, float(right), float(front), turn=facing + turn)
+    for turned, apart in ((turn, gap), (0.0, 0.0)):
+        reach = (np.cos(turned) * size[1] + abs(np.sin(turned)) * size[0]) / 2
+        away = table.size[0 if at_end else 1] / 2 + apart + reach
+        # the chair stands opposite to where it looks: its front is (-sin, cos) of ``facing``
+        right = float(np.sin(facing) * away) + (0.0 if at_end else along)
+        front = float(-np.cos(facing) * away) + (along if at_end else 0.0)
+        if room.put_near(name, table, right, front, turn=facing + turned, size=size) is not None:
+            return
 
 
 GROUPS: dict[str, dict[Group, float]] = {

@@ -1,0 +1,146 @@
+"""Files that commands read and write."""
+
+import errno
+import os
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from panoscene.cli._errors import InputError
+from panoscene.scene import PanoramaError, Scene, SceneFormatError, write_scene
+
+CERTIFICATE = ".certificate.json"
+"""What the name of a certificate ends in; files named so are never taken for scenes."""
+
+
+@contextmanager
+def blaming(culprit: object) -> Iterator[None]:
+    """Turn a ValueError about values the user gave into an InputError that names the culprit.
+
+    Errors of files name their file already and pass through.
+    """
+    try:
+        yield
+    except (InputError, SceneFormatError, PanoramaError):
+        raise
+    except ValueError as error:
+        raise InputError(f"{culprit}: {error}") from None
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Make the folder that a file goes into, and report what goes wrong under the file's name."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        blocked = error.filename is not None and Path(error.filename) in path.parents
+        where = f"{error.filename}: " if blocked else ""
+        raise InputError(f"{path}: cannot be written: {where}{reason}") from None
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text to a file that appears complete or not at all."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write bytes to a file that appears complete or not at all."""
+    with writing(path):
+        target = path.resolve()
+        temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
+        try:
+            with temporary.open("xb") as stream:
+                stream.write(data)
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def write_scene_from(source: Path, scene: Scene, target: Path) -> None:
+    """Write a scene that was read from another file; the photo is still found from there."""
+    photo = scene.panorama.file
+    if photo is not None and not Path(photo).is_absolute():
+        try:
+            photo = Path(os.path.relpath(source.parent / photo, target.parent)).as_posix()
+        except ValueError:  # another drive
+            photo = (source.parent / photo).resolve().as_posix()
+        scene = replace(scene, panorama=replace(scene.panorama, file=photo))
+    with writing(target):
+        write_scene(scene, target)
+
+
+def scene_files(arguments: Sequence[str]) -> list[Path]:
+    """Return the scene files that arguments name, each once: files, folders, or patterns.
+
+    Raises:
+        InputError: Nothing was named, or a folder or a pattern holds no scene file.
+    """
+    if not arguments:
+        raise InputError("SCENE: found nothing, expected scene.json files, folders or patterns")
+    files: dict[Path, Path] = {}
+    for argument in arguments:
+        path = Path(argument)
+        if path.is_dir():
+            named = path.glob("*.json")
+        elif path.exists() or not any(mark in argument for mark in "*?["):
+            named = iter([path])
+        else:
+            anchor = Path(path.anchor)
+            named = anchor.glob(str(path.relative_to(anchor)))
+        # a shell may have expanded the pattern, so certificates are left out wherever they are
+        scenes = sorted(file for file in named if not file.name.endswith(CERTIFICATE[1:]))
+        if not scenes and not path.is_file():
+            raise InputError(f"{argument}: found no scene files there, expected names in .json")
+        for file in scenes:
+            files.setdefault(file.resolve(), file)
+    if not files:
+        raise InputError("SCENE: found only certificates, expected scene.json files")
+    return list(files.values())
+
+
+def scene_targets(files: Sequence[Path], output: Path) -> Mapping[Path, Path]:
+    """Return where the scene made from each file goes: a single .json file, or into a folder.
+
+    Raises:
+        InputError: Several scenes would share a file, or the output is a file where a folder must
+            be.
+    """
+    if output.suffix == ".json" and not output.is_dir():
+        if len(files) > 1:
+            found = f"one file for {len(files)} scenes"
+            raise InputError(f"--output {output}: found {found}, expected a folder")
+        return {files[0]: output}
+    check_folder(output)
+    sources: dict[str, Path] = {}
+    for file in files:
+        name = f"{file.stem}.json"
+        if name in sources:
+            raise InputError(
+                f"--output {output}: found {sources[name]} and {file}, which would both become "
+                f"{output / name}; expected different names"
+            )
+        sources[name] = file
+    return {file: output / name for name, file in sources.items()}
+
+
+def check_folder(output: Path) -> None:
+    """Refuse an output that is not a folder and cannot become one.
+
+    Raises:
+        InputError: There is a file of that name.
+    """
+    if output.exists() and not output.is_dir():
+        raise InputError(f"--output {output}: found a file, expected a folder")
+
+
+def beside(target: Path, ending: str) -> Path:
+    """Return the path next to a scene file with the same name and another ending."""
+    return target.with_name(target.stem + ending)

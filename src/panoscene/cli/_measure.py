@@ -1,0 +1,52 @@
+"""Benchmarks and experiments: run them, print or write what they find."""
+
+from pathlib import Path
+
+from panoscene.cli._errors import InputError
+from panoscene.cli._files import check_folder, write_text
+from panoscene.cli._progress import progress_words
+from panoscene.cli._terminal import json_text, note, say, say_json
+from panoscene.eval import (
+    benchmark_table,
+    experiment_table,
+    run_arrange_benchmark,
+    run_arrange_experiment,
+)
+
+
+def run_bench(repeats: int, *, as_json: bool) -> int:
+    """Run the benchmark of the optimiser and return the exit code."""
+    _at_least(1, "--repeats", repeats)
+    with progress_words() as progress:
+        result = run_arrange_benchmark(repeats=repeats, progress=progress)
+    if as_json:
+        say_json(result)
+    else:
+        say(benchmark_table(result))
+    return 0
+
+
+def run_experiment(output: Path | None, *, scenes: int, seed: int, as_json: bool) -> int:
+    """Run the experiment of the optimiser and return the exit code."""
+    _at_least(1, "--scenes", scenes)
+    _at_least(0, "--seed", seed)
+    if output is not None:
+        # before the long run, not after it
+        check_folder(output)
+    with progress_words() as progress:
+        result = run_arrange_experiment(scenes=scenes, seed=seed, progress=progress)
+    table = experiment_table(result)
+    if output is not None:
+        write_text(output / "arrange.json", json_text(result) + "\n")
+        write_text(output / "arrange.md", table + "\n")
+        note(f"wrote {output}: arrange.json, arrange.md")
+    if as_json:
+        say_json(result)
+    else:
+        say(table)
+    return 0
+
+
+def _at_least(least: int, option: str, value: int) -> None:
+    if value < least:
+        raise InputError(f"{option}: found {value}, expected {least} or more")

@@ -1,0 +1,119 @@
+"""The program: which commands there are, and how a run of one ends."""
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+import tyro
+
+from panoscene import __version__
+from panoscene.cli._commands import (
+    arrange,
+    bench,
+    convert,
+    demo,
+    experiment,
+    relations,
+    schema,
+)
+from panoscene.cli._errors import InputError
+from panoscene.cli._help import explain, summarised
+from panoscene.cli._terminal import complain
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "demo": demo,
+    "arrange": arrange,
+    "relations": relations,
+    "convert": convert,
+    "schema": schema,
+    "bench": bench,
+    "experiment": experiment,
+}
+"""Every command by its name: a function of its options that returns the exit code."""
+
+OVERVIEW = """\
+Describe furnished rooms, derive how their objects relate, and repair their arrangement. Each
+command explains itself, as in panoscene arrange --help; panoscene --version prints the version.
+For example:
+
+    panoscene demo -o demo
+    panoscene arrange room.json -o repaired.json
+"""
+
+CONFIG = (tyro.conf.FlagCreatePairsOff,)
+"""Of tyro: flags without a --no- form."""
+
+USAGE, INTERRUPTED, BROKEN_PIPE = 2, 130, 141
+"""Exit codes besides 0: wrong input; Ctrl-C and a reader that went away, as shells count them."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command that the arguments name and return the exit code.
+
+    What is wrong with the user's input becomes one message on stderr and code 2. Errors of this
+    program itself keep their traceback.
+
+    Args:
+        argv: arguments without the program's name; those of the process when None.
+
+    Raises:
+        SystemExit: help was asked for (code 0), or the arguments make no sense (code 2).
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        try:
+            return _run(arguments)
+        finally:
+            # now, not when the interpreter ends, where nobody catches a full disk
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        _discard_output()
+        return BROKEN_PIPE
+    except OSError as error:
+        _discard_output()
+        reason = (error.strerror or str(error)).lower()
+        complain(f"{error.filename}: {reason}" if error.filename else reason)
+    except ValueError as error:
+        if not _is_about_input(error):
+            raise
+        complain(str(error))
+    return USAGE
+
+
+def _run(arguments: list[str]) -> int:
+    if arguments[:1] == ["--version"]:
+        sys.stdout.write(f"panoscene {__version__}\n")
+        return 0
+    name = arguments[0] if arguments else ""
+    if name in COMMANDS:
+        command, arguments = COMMANDS[name], arguments[1:]
+        explain(command.__doc__ or "", arguments)
+        program = f"panoscene {name}"
+        return tyro.cli(command, prog=program, description=" ", args=arguments, config=CONFIG)
+    # help, or a complaint about the arguments: ends here
+    explain(OVERVIEW, arguments)
+    overview = {name: summarised(command) for name, command in COMMANDS.items()}
+    return tyro.extras.subcommand_cli_from_dict(
+        overview, prog="panoscene", args=arguments, config=CONFIG
+    )
+
+
+def _is_about_input(error: ValueError) -> bool:
+    """Return whether an error describes a file or an option rather than a fault in the code."""
+    if isinstance(error, InputError):
+        return True
+    from panoscene.scene import PanoramaError, SceneFormatError  # noqa: PLC0415
+
+    return isinstance(error, SceneFormatError | PanoramaError)
+
+
+def _discard_output() -> None:
+    """Send output that cannot be written nowhere, so that the interpreter does not try again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -1,0 +1,197 @@
+"""A sheet of paper measured in pixels: shapes and text in paint order, saved as a PNG."""
+
+import os
+import secrets
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+from matplotlib import patheffects
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox, IdentityTransform
+
+from panoscene.views._style import FONT, INK, LABEL, PAPER
+
+_DPI = 100
+_POINTS = 72 / _DPI
+"""matplotlib measures widths and type in points."""
+LINE_SPACING = 1.2
+Points = Sequence[Sequence[float]] | Sequence[np.ndarray] | np.ndarray
+
+
+class Page:
+    """A sheet with x to the right and y up, in pixels from the lower left corner.
+
+    What is drawn later covers what was drawn before. Only objects of this page are touched, no
+    state of matplotlib, so pages can be drawn in several threads and without a display.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self._figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor=PAPER)
+        self._canvas = FigureCanvasAgg(self._figure)
+        self._clip: Bbox | None = None
+        self._drawn = 0
+        self._label_sizes: dict[str, tuple[float, float]] = {}
+
+    def clip(self, bounds: tuple[float, float, float, float] | None) -> None:
+        """Keep what follows inside (left, bottom, right, top), or everywhere with None."""
+        self._clip = None if bounds is None else Bbox.from_extents(*bounds)
+
+    def area(
+        self,
+        shape: shapely.Geometry,
+        *,
+        fill: str | None = None,
+        edge: str | None = None,
+        width: float = 0.0,
+        dashes: tuple[float, float] | None = None,
+        hatch: str | None = None,
+        alpha: float = 1.0,
+    ) -> None:
+        """Draw polygons with their holes; other parts of the geometry are ignored."""
+        for polygon in shapely.get_parts(shape):
+            if polygon.geom_type != "Polygon" or polygon.is_empty:
+                continue
+            rings = [polygon.exterior, *polygon.interiors]
+            path = Outline.make_compound_path(
+                *(Outline(ring.coords, closed=True) for ring in rings)
+            )
+            patch = PathPatch(
+                path,
+                facecolor=(fill, alpha) if fill else "none",
+                edgecolor=edge or "none",
+                linewidth=width * _POINTS,
+                linestyle="-" if dashes is None else (0, [d / max(width, 1.0) for d in dashes]),
+                hatch=hatch,
+                joinstyle="miter",
+            )
+            self._add(patch)
+
+    def line(
+        self,
+        points: Points,
+        *,
+        colour: str = INK,
+        width: float = 1.0,
+        dashes: tuple[float, float] | None = None,
+        cap: Literal["butt", "round"] = "butt",
+    ) -> None:
+        """Draw a line through points."""
+        x, y = np.asarray(points, dtype=float).T
+        self._add(
+            Line2D(
+                x,
+                y,
+                color=colour,
+                linewidth=width * _POINTS,
+                linestyle="-" if dashes is None else (0, tuple(d / width for d in dashes)),
+                solid_capstyle=cap,
+                dash_capstyle=cap,
+            )
+        )
+
+    def disc(
+        self, centre: Points, radius: float, *, fill: str, edge: str = INK, width: float = 1.5
+    ) -> None:
+        """Draw a filled circle."""
+        self.area(shapely.Point(centre).buffer(radius, 32), fill=fill, edge=edge, width=width)
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        *,
+        size: float,
+        colour: str = INK,
+        bold: bool = False,
+        align: Literal["left", "center", "right"] = "left",
+        rotation: float = 0.0,
+        halo: str | None = None,
+    ) -> None:
+        """Write text whose middle is at height y; ``halo`` is the colour of a soft rim."""
+        artist = Text(
+            x,
+            y,
+            text,
+            color=colour,
+            fontproperties=_font(size, bold),
+            horizontalalignment=align,
+            verticalalignment="center",
+            multialignment="center",
+            linespacing=LINE_SPACING,
+            rotation=rotation,
+            rotation_mode="default",
+            parse_math=False,
+            usetex=False,
+        )
+        if halo:
+            artist.set_path_effects([patheffects.withStroke(linewidth=2.6, foreground=halo)])
+        self._add(artist)
+
+    def text_size(self, text: str, size: float, *, bold: bool = False) -> tuple[float, float]:
+        """Return width and height of text in pixels."""
+        renderer: Any = self._canvas.get_renderer()
+        lines = text.split("\n")
+        widths = [
+            renderer.get_text_width_height_descent(line, _font(size, bold), False)[0]
+            for line in lines
+        ]
+        return max(widths), size * (1.0 + LINE_SPACING * (len(lines) - 1))
+
+    def label_size(self, text: str) -> tuple[float, float]:
+        """Return width and height in pixels of a label in a plan, measured once for each text."""
+        if text not in self._label_sizes:
+            self._label_sizes[text] = self.text_size(text, LABEL)
+        return self._label_sizes[text]
+
+    def fitted(self, text: str, size: float, width: float, *, bold: bool = False) -> str:
+        """Return the text, cut with an ellipsis where it is wider than ``width``."""
+        if self.text_size(text, size, bold=bold)[0] <= width:
+            return text
+        keep = len(text)
+        while keep > 1 and self.text_size(text[:keep] + "…", size, bold=bold)[0] > width:
+            keep -= 1
+        return text[:keep].rstrip() + "…"
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the page as a PNG that appears complete or not at all."""
+        buffer = BytesIO()
+        self._canvas.print_png(buffer, metadata={"Software": None})
+        write_file(Path(path), buffer.getvalue())
+
+    def _add(self, artist: Artist) -> None:
+        self._drawn += 1
+        artist.set_zorder(self._drawn)
+        # no axes: coordinates are pixels of the canvas
+        artist.set_transform(IdentityTransform())
+        self._figure.add_artist(artist, clip=False)
+        artist.set_clip_box(self._clip)
+        artist.set_clip_on(self._clip is not None)
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file that appears complete or not at all; one that was there is replaced."""
+    target = path.resolve()
+    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
+    try:
+        with temporary.open("xb") as stream:
+            stream.write(content)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _font(size: float, bold: bool) -> FontProperties:
+    return FontProperties(family=FONT, size=size * _POINTS, weight="bold" if bold else "normal")

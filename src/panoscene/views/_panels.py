@@ -1,0 +1,110 @@
+"""How the page is divided: one panel for each room, all at one scale, and the key."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from panoscene.scene import Scene
+from panoscene.views._key import longest_key
+from panoscene.views._labels import Label
+from panoscene.views._pieces import Bounds, Plan, View, make_plan, room_turn, scene_bounds
+from panoscene.views._style import group_of
+
+KEY_WIDTH = 256.0
+HEADER, FOOTER = 74.0, 54.0
+AROUND = 54.0
+"""Pixels around a room for dimensions and numbers."""
+ONE_WIDTH, SEVERAL_WIDTH, LOWEST, HIGHEST, LARGEST = 1200, 1600, 560, 1000, 10000
+"""Pixels: usual widths, limits of usual heights, and the largest width or height."""
+WORTH_TURNING = 1.15
+"""So much larger a room must become by another quarter turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """The part of the page that one scene has, and what is drawn in it."""
+
+    left: float
+    right: float
+    view: View
+    plan: Plan
+    content: Bounds
+    """What room and objects take, in pixels; at the same place in every panel."""
+
+
+def make_panels(
+    scenes: Sequence[tuple[str, Scene]],
+    reference: Scene | None,
+    relations: bool,
+    size_px: tuple[int, int],
+) -> list[Panel]:
+    """Return the panels: equally wide, rooms in their middle, at one scale and turn."""
+    width = (size_px[0] - KEY_WIDTH) / len(scenes)
+    height = size_px[1] - HEADER - FOOTER
+    free = _free(size_px, len(scenes))
+    if min(free) < 50:
+        raise ValueError(f"size_px: found {size_px}, too small for {len(scenes)} picture(s)")
+    shown = [scene for _, scene in scenes] + ([] if reference is None else [reference])
+    turn, scale, (low_x, low_y, high_x, high_y) = _fit(shown, free)
+    panels = []
+    for k, (_, scene) in enumerate(scenes):
+        middle = (k + 0.5) * width, FOOTER + height / 2
+        x, y = scale * (high_x - low_x) / 2, scale * (high_y - low_y) / 2
+        offset = middle[0] - x - scale * low_x, middle[1] - y - scale * low_y
+        view = View(turn, scale, offset)
+        plan = make_plan(scene, view, relations=relations)
+        content = middle[0] - x, middle[1] - y, middle[0] + x, middle[1] + y
+        panels.append(Panel(k * width, (k + 1) * width, view, plan, content))
+    return panels
+
+
+def _free(size_px: tuple[int, int], count: int) -> tuple[float, float]:
+    """Return width and height in pixels that a room of each panel may take."""
+    width = (size_px[0] - KEY_WIDTH) / count
+    return width - 2 * AROUND, size_px[1] - HEADER - FOOTER - 2 * AROUND
+
+
+def natural_size(scenes: Sequence[Scene], reference: Scene | None, width: int) -> tuple[int, int]:
+    """Return the size of a page without empty strips above and below rooms and key."""
+    shown = [*scenes, *([] if reference is None else [reference])]
+    _, scale, (_, low, _, high) = _fit(shown, _free((width, HIGHEST), len(scenes)))
+    rooms = HEADER + FOOTER + 2 * AROUND + scale * (high - low)
+    key = longest_key([int(k) for scene in scenes for k in scene.objects.category])
+    return width, int(min(max(rooms, key, LOWEST), HIGHEST))
+
+
+def _fit(scenes: list[Scene], free: tuple[float, float]) -> tuple[float, float, Bounds]:
+    """Return turn, scale and bounds of the room.
+
+    +y points up as far as the walls allow, unless another quarter turn makes the room clearly
+    larger.
+    """
+    upright = room_turn(scenes[0])
+    options = []
+    for turn in (upright, upright - math.copysign(math.pi / 2, upright)):
+        low_x, low_y, high_x, high_y = bounds = scene_bounds(scenes, turn)
+        scale = min(free[0] / (high_x - low_x), free[1] / (high_y - low_y))
+        options.append((turn, scale, bounds))
+    return options[1] if options[1][1] > WORTH_TURNING * options[0][1] else options[0]
+
+
+def number_objects(panels: list[Panel], names: list[dict[int, Label]]) -> list[dict[int, str]]:
+    """Return the number of each object that has no name in one of the panels, for each panel.
+
+    Numbers count through groups and categories, so that the key can say "3-6 chair"; the object
+    of the same index and category has the same number everywhere.
+    """
+    nameless: dict[tuple[str, str, int], None] = {}
+    for panel, named in zip(panels, names, strict=True):
+        for piece in panel.plan.pieces:
+            if piece.index not in named:
+                nameless[group_of(piece.category), piece.category, piece.index] = None
+    number = {key: str(k) for k, key in enumerate(sorted(nameless), start=1)}
+    return [
+        {
+            piece.index: number[key]
+            for piece in panel.plan.pieces
+            if (key := (group_of(piece.category), piece.category, piece.index)) in number
+        }
+        for panel in panels
+    ]

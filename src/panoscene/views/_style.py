@@ -1,0 +1,102 @@
+"""The one look of all pictures: colours, type sizes, line widths. Lengths in pixels."""
+
+from types import MappingProxyType
+
+FONT = "DejaVu Sans"
+"""Comes with matplotlib, so pictures are the same on every machine."""
+
+TITLE, BODY, LABEL, SMALL = 22.0, 16.0, 14.5, 14.0
+"""Type sizes: titles, legend and captions, names and numbers in the plan, dimensions."""
+
+INK = "#22272e"
+"""Text, outlines and fronts."""
+FAINT_INK = "#5c6570"
+"""Captions and dimensions."""
+PAPER = "#ffffff"
+FLOOR = "#f6f4ef"
+WALL = "#4b525c"
+LEADER = "#5c6570"
+ALARM = "#d0021b"
+"""Collisions and parts outside the room; always with hatching, never by colour alone."""
+CONTACT = "#ffffff"
+REFERENCE = "#6b7280"
+"""Outlines of where the objects truly are."""
+
+WALL_THICKNESS = 0.12
+"""Metres."""
+MOST_WALL = 15.0
+"""Pixels."""
+THIN, OUTLINE, FRONT, HEAVY = 1.0, 1.4, 3.4, 2.6
+CONTACT_WIDTH, CONTACT_RIM = 4.6, 1.5
+MARGIN = 24.0
+OPAQUE, SEE_THROUGH = 0.88, 0.45
+"""Of fills; overhead pieces and carpets are see-through."""
+OVERHEAD = 1.3
+"""Metres above the floor from which a piece hangs overhead: dashed and see-through."""
+
+GROUPS = MappingProxyType(
+    {
+        "seating": ("bench", "chair", "office_chair", "sofa", "sofa_chair", "stool"),
+        "beds": ("bed", "crib", "cushion"),
+        "tables": ("coffee_table", "console_table", "counter", "pool_table", "table"),
+        "storage": (
+            "basket", "bottom_cabinet", "bottom_cabinet_no_top", "chest", "shelf", "top_cabinet",
+            "trash_can",
+        ),
+        "kitchen and laundry": (
+            "coffee_machine", "cooktop", "dishwasher", "dryer", "fridge", "microwave", "oven",
+            "range_hood", "stove", "washer",
+        ),
+        "bathroom": ("bathtub", "shower", "sink", "toilet", "towel_rack"),
+        "lamps and decoration": (
+            "carpet", "floor_lamp", "grandfather_clock", "mirror", "picture", "plant",
+            "table_lamp", "wall_clock",
+        ),
+        "devices and leisure": (
+            "guitar", "heater", "laptop", "loudspeaker", "monitor", "piano", "speaker_system",
+            "standing_tv", "treadmill", "wall_mounted_tv",
+        ),
+        "doors and windows": ("door", "fence", "window"),
+    }
+)  # fmt: skip
+"""The groups that share a colour, and the categories in them."""
+
+GROUP_COLOURS = MappingProxyType(
+    {
+        "seating": "#77aadd",
+        "beds": "#ffaabb",
+        "tables": "#eedd88",
+        "storage": "#44bb99",
+        "kitchen and laundry": "#bbcc33",
+        "bathroom": "#99ddff",
+        "lamps and decoration": "#ee8866",
+        "devices and leisure": "#9a8aad",
+        "doors and windows": "#e6e8ec",
+    }
+)
+"""Fills that carry dark text and stay apart for colour-blind readers, which a test simulates.
+
+Seven are from Paul Tol's light scheme; mauve and pale grey are chosen to stay apart from them.
+"""
+
+_GROUP = {category: group for group, members in GROUPS.items() for category in members}
+
+
+def group_of(category: str) -> str:
+    """Return the group whose colour a category wears.
+
+    Example:
+        >>> group_of("sofa")
+        'seating'
+    """
+    return _GROUP[category]
+
+
+def words(category: str) -> str:
+    """Return a category as it is written in pictures.
+
+    Example:
+        >>> words("coffee_table")
+        'coffee table'
+    """
+    return "cabinet, no top" if category == "bottom_cabinet_no_top" else category.replace("_", " ")

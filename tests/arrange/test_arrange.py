@@ -1,0 +1,263 @@
+"""The optimiser as users meet it: repairs, promises, bad input, batches."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from panoscene.arrange import (
+    PRESETS,
+    TERM_NAMES,
+    Arrangement,
+    ArrangementSettings,
+    arrange,
+    arrange_scenes,
+    collate_scenes,
+    energy,
+    solver_states,
+)
+from panoscene.eval import broken_promises, run_arrange_safety
+from panoscene.geometry import OrientedBoxes, paired_box_iou
+from panoscene.scene import Layout, Objects, Scene, relations_from_boxes, scene_from_boxes
+from panoscene.synth import sample_room
+
+from .conftest import noisy_room
+
+ROOM = Layout(torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]))
+
+
+def scene_of(*rows: tuple[float, ...], layout: Layout = ROOM) -> Scene:
+    """A scene of tables with rows (x, y, z, width, depth, height, yaw)."""
+    values = torch.tensor(rows, dtype=torch.float32).reshape(-1, 7)
+    n = len(values)
+    boxes = OrientedBoxes(values[:, :3], values[:, 3:6], values[:, 6])
+    objects = Objects(
+        boxes=boxes,
+        category=torch.full((n,), 46),
+        score=torch.ones(n),
+        bfov=torch.ones(n, 4),
+        distance_score=torch.ones(n),
+        yaw_score=torch.ones(n),
+    )
+    return scene_from_boxes(objects, layout)
+
+
+def mean_iou(found: Scene, truth: Scene) -> float:
+    return float(paired_box_iou(found.objects.boxes, truth.objects.boxes).mean())
+
+
+def promised(result: Arrangement) -> None:
+    """What ``default`` promises of every result."""
+    assert broken_promises(result) == []
+
+
+def test_default_brings_rooms_nearer_to_the_truth(noisy_rooms: list[tuple[Scene, Scene]]):
+    results = arrange_scenes([noisy for _, noisy in noisy_rooms])
+    gains = []
+    for (truth, noisy), result in zip(noisy_rooms, results, strict=True):
+        promised(result)
+        gains.append(mean_iou(result.scene, truth) - mean_iou(noisy, truth))
+    assert np.mean(gains) > 0.25
+    assert sum(r.certificate.after.colliding_pairs for r in results) == 0
+    assert sum(r.certificate.before.colliding_pairs for r in results) > 3
+    assert all(result.certificate.changed for result in results)
+
+
+def test_batch_and_single_agree(noisy_rooms: list[tuple[Scene, Scene]]):
+    scenes = [noisy for _, noisy in noisy_rooms[:4]]
+    for name in ("default", "released"):
+        together = arrange_scenes(scenes, name)
+        for scene, result in zip(scenes, together, strict=True):
+            alone = arrange(scene, name)
+            torch.testing.assert_close(
+                alone.scene.objects.boxes.centre,
+                result.scene.objects.boxes.centre,
+                atol=2e-3,
+                rtol=0,
+            )
+
+
+def test_the_same_input_gives_the_same_output():
+    _, noisy = noisy_room(3)
+    first, second = arrange(noisy), arrange(noisy)
+    assert torch.equal(first.scene.objects.boxes.centre, second.scene.objects.boxes.centre)
+    assert first.certificate == second.certificate
+
+
+def test_released_descends_its_energy():
+    scenes = [noisy_room(seed)[1] for seed in range(4)]
+    for result in arrange_scenes(scenes, "released"):
+        assert result.certificate.after.energy < 0.5 * result.certificate.before.energy
+
+
+def test_a_good_room_stays_nearly_as_it_is():
+    truth = sample_room(np.random.default_rng(5), objects=15)
+    result = arrange(truth)
+    promised(result)
+    moved = (result.scene.objects.boxes.centre - truth.objects.boxes.centre).norm(dim=-1)
+    assert moved.max() < 0.05
+
+
+def test_nothing_is_broken_by_wrong_relations():
+    """Relations of another room are as wrong as they get."""
+    for seed in range(5):
+        _, noisy = noisy_room(seed, objects=10, corners=6)
+        other = sample_room(np.random.default_rng(seed + 100), objects=10, corners=6)
+        promised(arrange(dataclasses.replace(noisy, relations=other.relations)))
+
+
+def test_certificate_adds_up_and_names_every_term():
+    _, noisy = noisy_room(1)
+    certificate = arrange(noisy).certificate
+    for violations in (certificate.before, certificate.after):
+        assert tuple(violations.terms) == TERM_NAMES
+        assert sum(violations.terms.values()) == pytest.approx(violations.energy, rel=1e-5)
+    assert certificate.preset == "default"
+    assert certificate.as_dict()["before"]
+
+
+def test_certificate_measures_by_hand():
+    scene = scene_of(
+        (0, 0, 0.5, 1, 1, 1, 0), (0.7, 0, 0.5, 1, 1, 1, 0), (1.8, 0, 0.5, 0.2, 1, 1, 0)
+    )
+    poking = scene_of((1.9, 0, 0.5, 1, 1, 1, 0))
+    pair = arrange(scene, PRESETS["default"].model_copy(update={"steps": 0})).certificate
+    assert pair.before.colliding_pairs == 1
+    assert pair.before.worst_penetration == pytest.approx(0.3)
+    assert pair.before.out_of_room_volume == pytest.approx(0, abs=1e-6)
+    assert not pair.changed
+    outside = arrange(poking, "default").certificate.before
+    assert outside.worst_out_of_room == pytest.approx(0.4)
+    assert outside.out_of_room_volume == pytest.approx(0.4)
+
+
+def test_a_single_fault_is_repaired_and_nothing_else_moves():
+    scene = scene_of((0, 0, 0.5, 1, 1, 1, 0), (0.9, 0, 0.5, 1, 1, 1, 0), (-1, 1, 0.5, 1, 1, 1, 0))
+    result = arrange(scene)
+    promised(result)
+    assert result.certificate.after.worst_penetration < 0.02
+    still = result.scene.objects.boxes.centre[2] - scene.objects.boxes.centre[2]
+    assert still.norm() < 0.02
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_an_empty_room(preset: str):
+    result = arrange(scene_of(), preset)
+    assert len(result.scene.objects.boxes) == 0
+    assert result.certificate.after.energy == 0
+    assert not result.certificate.changed
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("count", [1, 64])
+def test_counts(preset: str, count: int):
+    _, noisy = noisy_room(2, objects=count)
+    result = arrange(noisy, preset)
+    assert len(result.scene.objects.boxes) == count
+    if preset == "default":
+        promised(result)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [(0, 0, 1, 9, 9, 5, 0.3)],  # larger than the room
+        [(9, 9, 0.5, 1, 1, 1, 0)],  # outside
+        [(1, 1, 0.5, 1, 1, 1, 0)] * 4,  # coincident
+        [(0, 0, 1.6, 1, 1, 1, 0)],  # around the camera
+        [(0, 0, 0.2, 1, 1, 0.4, 0)],  # under the camera
+        [(2, 2, 0.5, 1e-3, 1e-3, 1e-3, 0), (2, 2, 0.5, 1e-3, 1e-3, 1e-3, 0)],  # specks in a corner
+        [(1e4, 0, 0, 1, 1, 1, 0), (0, 0, -50, 100, 100, 100, 3)],  # absurd
+    ],
+)
+def test_strange_scenes(rows: list[tuple[float, ...]]):
+    for preset in PRESETS:
+        result = arrange(scene_of(*rows), preset)
+        if preset == "default":
+            promised(result)
+
+
+def test_non_convex_rooms_keep_objects_out_of_the_notch():
+    layout = Layout(torch.tensor([[-2.0, -2], [2, -2], [2, 0], [0.5, 0], [0.5, 2], [-2, 2]]))
+    scene = scene_of((0.6, 0.9, 0.5, 1, 1, 1, 0), layout=layout)
+    result = arrange(scene)
+    promised(result)
+    assert result.certificate.before.worst_out_of_room > 0.5
+    assert result.certificate.after.worst_out_of_room < 0.02
+
+
+def test_empty_list():
+    assert arrange_scenes([]) == []
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("centre", math.nan, "object 1, centre"),
+        ("size", math.inf, "object 1, size"),
+        ("yaw", math.nan, "object 1, yaw"),
+        ("size", 0.0, "above 0"),
+        ("size", -1.0, "above 0"),
+    ],
+)
+def test_bad_boxes_are_refused(field: str, value: float, words: str):
+    scene = scene_of((0, 0, 0.5, 1, 1, 1, 0), (1, 1, 0.5, 1, 1, 1, 0))
+    values = getattr(scene.objects.boxes, field).clone()
+    values[1] = value
+    boxes = dataclasses.replace(scene.objects.boxes, **{field: values})
+    bad = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, boxes=boxes))
+    with pytest.raises(ValueError, match=words):
+        arrange(bad)
+
+
+def test_unknown_preset():
+    with pytest.raises(ValueError, match="expected one of"):
+        arrange(scene_of(), "best")
+
+
+def test_frames_run_from_start_to_end():
+    _, noisy = noisy_room(4)
+    result = arrange(noisy, frames=5)
+    assert len(result.path) == 5
+    torch.testing.assert_close(result.path[0].centre, noisy.objects.boxes.centre, atol=1e-5, rtol=0)
+    torch.testing.assert_close(
+        result.path[-1].centre, result.scene.objects.boxes.centre, atol=0.01, rtol=0
+    )
+
+
+def test_missing_relations_are_derived():
+    _, noisy = noisy_room(6)
+    bare = dataclasses.replace(noisy, relations=None)
+    derived = dataclasses.replace(
+        noisy,
+        relations=relations_from_boxes(noisy.objects.boxes, noisy.layout, inside="any_corner"),
+    )
+    first, second = arrange(bare), arrange(derived)
+    assert torch.equal(first.scene.objects.boxes.centre, second.scene.objects.boxes.centre)
+
+
+def test_energy_of_other_boxes_is_that_of_the_variables():
+    """The boxes after a step, judged by the start's observation, descend in energy."""
+    _, noisy = noisy_room(7)
+    batch = collate_scenes([noisy])
+    for settings in (PRESETS["default"], PRESETS["released"]):
+        start = energy(batch, settings).sum()
+        torch.testing.assert_close(energy(batch, settings, boxes=batch.boxes).sum(), start)
+        for step, boxes in solver_states(batch, settings):
+            last = energy(batch, settings, boxes=boxes).sum()
+            if step == 20:
+                break
+        assert last < 0.7 * start
+
+
+def test_settings_are_strict():
+    with pytest.raises(ValueError, match="extra"):
+        ArrangementSettings.model_validate({"step": 3})
+
+
+def test_random_scenes_are_never_made_worse():
+    """A sample of what ``panoscene experiment safety`` does with 10,000 scenes."""
+    result = run_arrange_safety(scenes=500, seed=1)
+    assert result["worse"] == 0, result["broken"]
