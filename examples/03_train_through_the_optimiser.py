@@ -33,9 +33,9 @@ batch = collate_scenes([scene])
 settings = ArrangementSettings.preset("default").model_copy(update={"steps": 12})
 
 logit = torch.ones(2, requires_grad=True)  # what a relation network would predict
-learner = torch.optim.Adam([logit], lr=0.3)
+learner = torch.optim.Adam([logit], lr=0.5)
 wall = torch.tensor([0.0, 0.0, 1.0, 0.0])  # the third wall, from corner 2 to corner 3
-for step in range(10):
+for step in range(6):
     score = torch.sigmoid(logit)
     touching_wall = score[None, :, None] * wall
     boxes = optimise_boxes(replace(batch, touching_wall=touching_wall), settings)

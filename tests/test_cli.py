@@ -1,11 +1,13 @@
 """The commands: what they print and write, how they end, and what they say about bad input."""
 
+import inspect
 import json
 import os
 import stat
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +36,7 @@ ROOM: dict[str, Any] = {
         {
             "id": "bed",
             "category": "bed",
-            "box": {"centre": [0, 1.1, 0.3], "size": [1.6, 2, 0.6], "yaw": 3.1415},
+            "box": {"centre": [0, 1.05, 0.3], "size": [1.6, 2, 0.6], "yaw": 3.1415},
         },
         {
             "id": "chair",
@@ -67,7 +69,8 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
             code = main([str(argument) for argument in arguments])
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else 0
-        return code, *capsys.readouterr()
+        out, err = capsys.readouterr()
+        return code, out, err
 
     return run_command
 
@@ -84,9 +87,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def panorama() -> Image.Image:
     """Return a panorama that is black but for a red spot a quarter turn to the left."""
-    pixels = np.zeros((64, 128, 3), np.uint8)
-    pixels[28:36, 28:36] = (255, 0, 0)
-    return Image.fromarray(pixels)
+    image = np.zeros((64, 128, 3), np.uint8)
+    image[28:36, 28:36] = (255, 0, 0)
+    return Image.fromarray(image)
+
+
+def pixels(path: str) -> np.ndarray:
+    """Return a picture as rows, columns and RGB."""
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("RGB"))
 
 
 def changed(**fields: Any) -> str:
@@ -145,8 +154,6 @@ def test_presets_of_the_option_are_those_of_the_library() -> None:
 
 
 def _parameters(command: str) -> Any:
-    import inspect  # noqa: PLC0415
-
     return inspect.signature(COMMANDS[command]).parameters.values()
 
 
@@ -180,6 +187,14 @@ def test_unwritable_output_ends_without_a_traceback() -> None:
         )
         os.close(device)
         assert (result.returncode, result.stderr) == (code, message)
+
+
+def test_names_cannot_control_the_terminal(folder: Path, run: Run) -> None:
+    # the one-byte form of the escape that starts a colour; scene files refuse the other one
+    box = ROOM["objects"][0]["box"]
+    Path("red.json").write_text(changed(objects=[{"id": "\x9b31m", "category": "bed", "box": box}]))
+    assert "\\x9b31m rests on the floor\n" in run("relations", "red.json")[1]
+    assert run("relations", "\x1b[31m.json")[2].startswith("error: \\x1b[31m.json: ")
 
 
 def test_interrupt_is_quiet(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,7 +244,7 @@ def test_arrange_draws_before_and_after(folder: Path, run: Run) -> None:
         "room.certificate.json",
         "room.before-after.png",
     }
-    assert Image.open("out/room.before-after.png").width > 1000
+    assert pixels("out/room.before-after.png").shape[1] > 1000
 
 
 def test_arrange_takes_files_folders_and_patterns(folder: Path, run: Run) -> None:
@@ -241,7 +256,7 @@ def test_arrange_takes_files_folders_and_patterns(folder: Path, run: Run) -> Non
     assert {name for name in files_in(folder / "o") if "certificate" not in name} == {
         *("room.json", "a.json", "b.json", "c.json")
     }
-    assert "sum or worst" in out
+    assert "sum or" in out
     assert "4 → 0" in out
     assert "wrote o: 4 of 4" in out
 
@@ -284,8 +299,6 @@ def test_arrange_isolates_a_scene_that_cannot_be_arranged(
 def test_arrange_solves_in_batches_that_fit_in_memory(folder: Path) -> None:
     scene = read_scene("room.json")
     repeated = scene.objects.boxes[torch.zeros(200, dtype=torch.int64)]
-    from dataclasses import replace  # noqa: PLC0415
-
     large = replace(scene, objects=replace(scene.objects, boxes=repeated))
     mixed = [(Path(str(k)), large if k % 10 == 0 else scene) for k in range(64)]
     batches = list(arrange_module.batches(mixed))
@@ -375,7 +388,10 @@ def test_bad_scenes_are_refused(folder: Path, run: Run, command: str, kind: str)
         (("arrange", "room.json", "twice", "-o", "o.json"), "one file for 2 scenes"),
         (("arrange", "room.json", "twice", "-o", "o"), "would both become"),
         (("arrange", "room.json", "-o", "boxes.csv"), "boxes.csv: found a file"),
-        (("arrange", "room.json", "-o", "boxes.csv/x"), "cannot be written: boxes.csv: "),
+        (
+            ("arrange", "room.json", "-o", "boxes.csv/x"),
+            "cannot be written: boxes.csv/x: not a directory",
+        ),
         (("arrange", "room.json", "-o", "o", "--steps", "-1"), "--steps: found -1"),
         (("arrange", "room.json", "-o", "o", "--settings", "no.json"), "no.json: no such file"),
         (("relations", "gone.json"), "gone.json: the path: found nothing"),
@@ -475,8 +491,7 @@ def test_all_relations_say_what_faces_what(folder: Path, run: Run) -> None:
         "bed faces the opposite way to chair",
         "lamp faces 90 degrees to the left of where chair faces",
         "lamp is farther from the camera than chair",
-    } - {"lamp faces 90 degrees to the left of where chair faces"} <= set(out.splitlines())
-    assert "lamp faces 90 degrees to the left of where chair faces" in out.splitlines()
+    } <= set(out.splitlines())
     assert err == ""
 
 
@@ -555,7 +570,7 @@ def test_scene_to_graph_derives_relations(folder: Path, run: Run) -> None:
 
 def spot(path: str) -> tuple[float, float]:
     """Return where the red spot is, from 0 to 1 to the right and down."""
-    red = np.asarray(Image.open(path).convert("RGB")).astype(float)[..., 0] / 255
+    red = pixels(path).astype(float)[..., 0] / 255
     rows, columns = np.indices(red.shape)
     total = red.sum()
     return (
@@ -569,15 +584,15 @@ def test_panorama_to_cube(folder: Path, run: Run) -> None:
     assert files_in(folder / "faces") == {
         *("front.png", "right.png", "back.png", "left.png", "up.png", "down.png")
     }
-    assert Image.open("faces/left.png").size == (20, 20)
+    assert pixels("faces/left.png").shape == (20, 20, 3)
     assert spot("faces/left.png") == pytest.approx((0.5, 0.5), abs=0.02)
-    assert np.asarray(Image.open("faces/right.png")).max() == 0
+    assert pixels("faces/right.png").max() == 0
 
 
 def test_panorama_to_view(folder: Path, run: Run) -> None:
     assert run("convert", "photo.png", "-o", "view.png", "--view", "-90,0,90")[0] == 0
     # as sharp as the panorama: 128 pixels around, 2 tan(45 degrees) * 128 / (2 pi)
-    assert Image.open("view.png").size == (41, 41)
+    assert pixels("view.png").shape == (41, 41, 3)
     assert spot("view.png") == pytest.approx((0.5, 0.5), abs=0.02)
     assert run("convert", "photo.png", "-o", "view.png", "--view", "-100,10,90")[0] == 0
     right, down = spot("view.png")
@@ -589,7 +604,7 @@ def test_panorama_to_view(folder: Path, run: Run) -> None:
 def test_panorama_is_turned(folder: Path, run: Run, name: str) -> None:
     # turned to the left, the camera looks at what was on the left
     assert run("convert", "photo.png", "-o", name, "--yaw-deg", "90")[0] == 0
-    assert Image.open(name).size == (128, 64)
+    assert pixels(name).shape == (64, 128, 3)
     assert spot(name) == pytest.approx((0.5, 0.5), abs=0.02)
 
 
@@ -614,10 +629,24 @@ def test_schema(run: Run) -> None:
 
 def test_demo(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def quick(output: Path, seed: int) -> DemoResult:
-        files = [
-            output / name for name in ("b.json", "a.json", "c.json", "b.png", "a.png", "c.png")
-        ]
-        return DemoResult(*files, 17, seed, 0.2, 0.6, 3, 0, 0.29, 0.004, 1.6, 0.04)
+        return DemoResult(
+            before=output / "b.json",
+            after=output / "a.json",
+            certificate=output / "c.json",
+            before_picture=output / "b.png",
+            after_picture=output / "a.png",
+            comparison=output / "c.png",
+            objects=17,
+            seed=seed,
+            mean_iou_before=0.2,
+            mean_iou_after=0.6,
+            colliding_pairs_before=3,
+            colliding_pairs_after=0,
+            worst_penetration_before=0.29,
+            worst_penetration_after=0.004,
+            out_of_room_volume_before=1.6,
+            out_of_room_volume_after=0.04,
+        )
 
     monkeypatch.setattr(demo_module, "run_demo", quick)
     code, out, err = run("demo", "-o", "there", "--seed", "5")

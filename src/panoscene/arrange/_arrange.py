@@ -191,35 +191,38 @@ def _choose(problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Me
     start = problem.start
     finite = torch.isfinite(final).all(0).all(-1)
     final = torch.where(finite[None, :, None], final, start)
-    best, after = final, _measure(final, problem)
+    solved = final
+    if problem.settings.safe:
+        solved = _settle(final, problem)
+    best, after = solved, _measure(solved, problem)
     final_energy = after.energy.sum(-1)
     words = ["solved" if good else "diverged, input returned" for good in finite.tolist()]
-    changed = finite.clone()
+    taken = finite
     if problem.settings.safe:
-        best = _settle(final, problem)
-        after = _measure(best, problem)
-        accepted = _acceptable(after, before)
-        words = ["solved" if good else "input returned" for good in accepted.tolist()]
-        candidates = [("solved", final)]
-        candidates += [
-            (f"state after {step} steps", kept[step]) for step in sorted(kept, reverse=True)
-        ]
-        candidates += [
-            (f"{part:.0%} of the way", start + part * (final - start)) for part in _BLENDS
-        ]
-        for label, candidate in candidates:
-            if bool(accepted.all()):
+        taken = _acceptable(after, before) & finite
+        words = ["solved" if good else "input returned" for good in taken.tolist()]
+        for label, candidate in _second_choices(start, final, kept):
+            if bool(taken.all()):
                 break
             trial = _measure(candidate, problem)
-            take = _acceptable(trial, before) & ~accepted
+            take = _acceptable(trial, before) & ~taken
             best = torch.where(take[None, :, None], candidate, best)
+            after = trial.where(take, after)
             words = [label if new else word for new, word in zip(take.tolist(), words, strict=True)]
-            accepted = accepted | take
-        best = torch.where(accepted[None, :, None], best, start)
-        after = _measure(best, problem)
-        changed = accepted
-    changed = changed & (best != start).any(0).any(-1)
+            taken = taken | take
+    changed = taken & (best != start).any(0).any(-1)
     return _Chosen(boxes_from_variables(best, problem), after, changed, words, final_energy)
+
+
+def _second_choices(
+    start: Tensor, final: Tensor, kept: dict[int, Tensor]
+) -> Iterator[tuple[str, Tensor]]:
+    """Yield what else may be acceptable, best first."""
+    yield "solved", final
+    for step in sorted(kept, reverse=True):
+        yield f"state after {step} steps", kept[step]
+    for part in _BLENDS:
+        yield f"{part:.0%} of the way", start + part * (final - start)
 
 
 def _settle(variables: Tensor, problem: Problem) -> Tensor:

@@ -1,9 +1,9 @@
 """What a result is worth: energy and physical violations before and after."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from panoscene.arrange._batch import ArrangementBatch
@@ -88,6 +88,13 @@ class Measures:
             worst_out_of_room=float(self.worst_outside[scene]),
             out_of_room_volume=float(self.outside_volume[scene]),
         )
+
+    def where(self, mask: Bool[Tensor, " scenes"], other: "Measures") -> "Measures":
+        """Return these measures for the scenes of the mask, and the other's elsewhere."""
+        pairs = [
+            (getattr(self, field.name), getattr(other, field.name)) for field in fields(Measures)
+        ]
+        return Measures(*[torch.where(mask.view(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs])
 
     def columns(self) -> Float[Tensor, "scenes measures"]:
         """Return everything that must not grow: energy, collisions, out-of-room."""

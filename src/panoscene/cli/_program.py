@@ -1,5 +1,6 @@
 """The program: which commands there are, and how a run of one ends."""
 
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -60,6 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: help was asked for (code 0), or the arguments make no sense (code 2).
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # a terminal that cannot show a character must not end the program
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         try:
             return _run(arguments)

@@ -12,11 +12,11 @@ from rich.text import Text
 
 from panoscene.arrange import Certificate, Violations
 
-COLUMNS: tuple[tuple[str, Callable[[Violations], float], str], ...] = (
-    ("energy", lambda v: v.energy, ".3f"),
-    ("colliding pairs", lambda v: v.colliding_pairs, ".0f"),
-    ("worst penetration, m", lambda v: v.worst_penetration, ".3f"),
-    ("out of room, m", lambda v: v.worst_out_of_room, ".3f"),
+COLUMNS: tuple[tuple[str, Callable[[Violations], int | float], str], ...] = (
+    ("energy", lambda v: v.energy, ".2f"),
+    ("colliding\npairs", lambda v: v.colliding_pairs, ".0f"),
+    ("worst pene-\ntration, cm", lambda v: 100 * v.worst_penetration, ".1f"),
+    ("worst out of\nroom, cm", lambda v: 100 * v.worst_out_of_room, ".1f"),
 )
 """What the table shows of the violations before and after."""
 
@@ -24,7 +24,7 @@ COLUMNS: tuple[tuple[str, Callable[[Violations], float], str], ...] = (
 def say_certificates(rows: Sequence[tuple[Path, Certificate]]) -> None:
     """Print what happened to each scene, and the sum or worst over several."""
     table = Table(box=box.SIMPLE_HEAD, show_footer=len(rows) > 1, pad_edge=False)
-    table.add_column("scene", footer="sum or worst", overflow="fold")
+    table.add_column("scene", footer="sum or\nworst", overflow="fold")
     for number, (title, value, form) in enumerate(COLUMNS):
         combined = sum if number < 2 else max
         before, after = (
@@ -39,11 +39,11 @@ def say_certificates(rows: Sequence[tuple[Path, Certificate]]) -> None:
             f"{value(certificate.before):{form}} → {value(certificate.after):{form}}"
             for _, value, form in COLUMNS
         ]
-        table.add_row(Text(str(file)), *cells, Text(certificate.outcome))
+        table.add_row(Text(file.name), *cells, Text(certificate.outcome))
     _print(table)
 
 
-def say_before_after(rows: Sequence[tuple[str, float, float, str]]) -> None:
+def say_before_after(rows: Sequence[tuple[str, int | float, int | float, str]]) -> None:
     """Print quantities before and after: name, two values, how to format them."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")

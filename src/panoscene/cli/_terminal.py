@@ -8,12 +8,12 @@ from typing import Any
 
 def say(text: str) -> None:
     """Print a line of the result."""
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(_printable(text) + "\n")
 
 
 def note(text: str) -> None:
     """Print a line that is not part of the result."""
-    sys.stderr.write(text + "\n")
+    sys.stderr.write(_printable(text) + "\n")
 
 
 def complain(message: str) -> None:
@@ -29,6 +29,13 @@ def say_json(value: Any) -> None:
 def json_text(value: Any) -> str:
     """Return a value as JSON for people and programs, without NaN and Infinity."""
     return json.dumps(_finite(value), indent=2, allow_nan=False)
+
+
+def _printable(text: str) -> str:
+    """Return text whose control characters, from names of files and objects, are only shown."""
+    return "".join(
+        c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 def _finite(value: Any) -> Any:

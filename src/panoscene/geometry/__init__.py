@@ -2,12 +2,10 @@
 
 from panoscene.geometry._angles import wrap_angle as wrap_angle
 from panoscene.geometry._bfov import bfov_area as bfov_area
-from panoscene.geometry._bfov import bfov_candidates as bfov_candidates
 from panoscene.geometry._bfov import bfov_contains as bfov_contains
 from panoscene.geometry._bfov import bfov_from_contour as bfov_from_contour
 from panoscene.geometry._bfov import bfov_from_directions as bfov_from_directions
 from panoscene.geometry._bfov import bfov_from_mask as bfov_from_mask
-from panoscene.geometry._bfov import smallest_bfov as smallest_bfov
 from panoscene.geometry._bfov_overlap import bfov_intersection_area as bfov_intersection_area
 from panoscene.geometry._bfov_overlap import bfov_iou as bfov_iou
 from panoscene.geometry._bfov_overlap import bfov_nms as bfov_nms
@@ -16,11 +14,13 @@ from panoscene.geometry._boundary import CORNER_DECAY as CORNER_DECAY
 from panoscene.geometry._boundary import boundary_from_layout as boundary_from_layout
 from panoscene.geometry._boundary import column_lon as column_lon
 from panoscene.geometry._boundary import corner_signal_from_layout as corner_signal_from_layout
-from panoscene.geometry._box_code import BoxCode as BoxCode
-from panoscene.geometry._box_code import DISTANCE_BINS as DISTANCE_BINS
+from panoscene.geometry._boundary_inverse import RecoveredLayout as RecoveredLayout
+from panoscene.geometry._boundary_inverse import layout_from_boundary as layout_from_boundary
 from panoscene.geometry._box_code import DISTANCE_BIN_WIDTH as DISTANCE_BIN_WIDTH
-from panoscene.geometry._box_code import YAW_BINS as YAW_BINS
+from panoscene.geometry._box_code import DISTANCE_BINS as DISTANCE_BINS
 from panoscene.geometry._box_code import YAW_BIN_WIDTH as YAW_BIN_WIDTH
+from panoscene.geometry._box_code import YAW_BINS as YAW_BINS
+from panoscene.geometry._box_code import BoxCode as BoxCode
 from panoscene.geometry._box_code import box_centre_from_view as box_centre_from_view
 from panoscene.geometry._box_code import decode_box_code as decode_box_code
 from panoscene.geometry._box_code import encode_boxes as encode_boxes
@@ -37,14 +37,12 @@ from panoscene.geometry._boxes import world_from_object as world_from_object
 from panoscene.geometry._cube import CUBE_FACES as CUBE_FACES
 from panoscene.geometry._cube import cube_from_panorama as cube_from_panorama
 from panoscene.geometry._cube import panorama_from_cube as panorama_from_cube
-from panoscene.geometry._layout import GRAZING as GRAZING
 from panoscene.geometry._layout import corner_visible as corner_visible
 from panoscene.geometry._layout import layout_iou_3d as layout_iou_3d
 from panoscene.geometry._layout import wall_boxes as wall_boxes
 from panoscene.geometry._layout import wall_distance as wall_distance
 from panoscene.geometry._layout import wall_normals as wall_normals
 from panoscene.geometry._oriented_boxes import OrientedBoxes as OrientedBoxes
-from panoscene.geometry._overlap import SHORTEST_EDGE as SHORTEST_EDGE
 from panoscene.geometry._overlap import box_intersection_volume as box_intersection_volume
 from panoscene.geometry._overlap import box_iou as box_iou
 from panoscene.geometry._overlap import paired_box_iou as paired_box_iou
@@ -60,7 +58,6 @@ from panoscene.geometry._polygon import footprint_area_in_polygon as footprint_a
 from panoscene.geometry._polygon import polygon_area as polygon_area
 from panoscene.geometry._polygon import polygon_contains as polygon_contains
 from panoscene.geometry._polygon import signed_distance_to_polygon as signed_distance_to_polygon
-from panoscene.geometry._polygon_validity import COINCIDENT as COINCIDENT
 from panoscene.geometry._polygon_validity import is_manhattan as is_manhattan
 from panoscene.geometry._polygon_validity import (
     polygon_intersection_area as polygon_intersection_area,

@@ -37,8 +37,9 @@ def separation_margins(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*ba
     x, y, z = (b.centre - a.centre).unbind(dim=-1)
     cos_a, sin_a = torch.cos(a.yaw), torch.sin(a.yaw)
     cos_b, sin_b = torch.cos(b.yaw), torch.sin(b.yaw)
-    turn = b.yaw - a.yaw
-    cos, sin = torch.cos(turn).abs(), torch.sin(turn).abs()
+    # of the relative yaw, from each box's own: pairs are many, boxes few
+    cos = (cos_a * cos_b + sin_a * sin_b).abs()
+    sin = (cos_a * sin_b - sin_a * cos_b).abs()
     up = z_a + z_b - z.abs()
     margins = [
         x_a + x_b * cos + y_b * sin - (x * cos_a + y * sin_a).abs(),

@@ -114,11 +114,9 @@ def draw_comparison(
         raise ValueError(f"size_px: found {size_px}, expected numbers from 1 to {LARGEST}")
     page = Page(*size_px)
     panels = make_panels(scenes, reference, relations, size_px)
-        names = [place_names(panel.plan, page.label_size) for panel in panels]
+    names = [place_names(panel.plan, page.label_size) for panel in panels]
     numbers = number_objects(panels, names)
-    labels = [
-        _place_labels(page, *parts) for parts in zip(panels, names, numbers, strict=True)
-    ]
+    labels = [_place_labels(page, *parts) for parts in zip(panels, names, numbers, strict=True)]
     for k, (panel, (title, scene)) in enumerate(zip(panels, scenes, strict=True)):
         _draw_panel(page, panel, labels[k], reference)
         caption = describe_room(scene) if captions is None else captions[k]
@@ -158,7 +156,7 @@ def _place_labels(
 def _draw_panel(
     page: Page, panel: Panel, labels: dict[int, Label], reference: Scene | None
 ) -> None:
-    page.clip((panel.left, 0, panel.right, page.height))
+    page.clip((panel.left, 0.0, panel.right, float(page.height)))
     draw_room(page, panel.plan, reference, panel.view)
     draw_dimensions(page, panel.plan, panel.content, panel.view.scale)
     draw_labels(page, labels)

@@ -107,8 +107,11 @@ def describe_violations(violations: Violations) -> str:
     pairs = {0: "no pair collides", 1: "1 pair collides"}.get(count, f"{count} pairs collide")
     depth = 100.0 * violations.worst_penetration
     worst = f"{depth:.0f} cm" if depth >= 1.0 else f"{10.0 * depth:.0f} mm"
+    overlap = "no overlap" if depth < 0.05 else f"worst overlap {worst}"
     volume = violations.out_of_room_volume
-    return f"{pairs} · worst overlap {worst} · {volume:.2f} m³ outside the room"
+    amount = f"{volume:.2f} m³" if volume >= 0.01 else f"{1000.0 * volume:.0f} l"
+    outside = "nothing" if volume < 0.0005 else amount
+    return f"{pairs} · {overlap} · {outside} outside the room"
 
 
 def _result(

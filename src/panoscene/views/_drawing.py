@@ -17,11 +17,11 @@ from panoscene.views._style import (
     FLOOR,
     FRONT,
     GROUP_COLOURS,
-    GROUPS,
     HEAVY,
     INK,
     LABEL,
     LEADER,
+    NO_FRONT,
     OPAQUE,
     OUTLINE,
     PAPER,
@@ -33,8 +33,6 @@ from panoscene.views._style import (
     group_of,
 )
 
-NO_FRONT = ("carpet", *GROUPS["doors and windows"])
-"""Categories whose fronts say nothing."""
 DIMENSION_GAP = 34.0
 """Pixels between what is drawn and the dimension lines."""
 
@@ -74,20 +72,11 @@ def draw_piece(page: Page, piece: Piece) -> None:
 
 def draw_front(page: Page, piece: Piece) -> None:
     """Draw a bar along the front, and a tip that points where the object faces."""
-    left, right = piece.front
-    along = right - left
-    width = float(np.linalg.norm(along))
-    depth = piece.footprint.area / max(width, 1e-9)
+    width, depth = piece.extent
     if width < 1e-6:
         return
-    forward = np.array([-along[1], along[0]]) / width
-    page.line([left, right], width=min(FRONT, max(1.5, 0.4 * depth)), colour=INK)
-    tip = min(8.0, 0.3 * depth, 0.3 * width)
-    if tip >= 2.5:
-        middle = (left + right) / 2
-        side = along / width * tip
-        triangle = shapely.Polygon([middle - side, middle + side, middle + forward * tip])
-        page.area(triangle, fill=INK)
+    page.line(piece.front, width=min(FRONT, max(1.5, 0.4 * depth)), colour=INK)
+    page.area(piece.tip, fill=INK)
 
 
 def draw_alarm(page: Page, shape: shapely.Geometry) -> None:

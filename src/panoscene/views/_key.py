@@ -159,7 +159,9 @@ def _draw_mark(page: Page, mark: str, x: float, y: float) -> None:
     elif mark == "camera":
         draw_camera(page, middle)
     elif mark == "reference":
-        page.area(shapely.box(x, y - 7, x + 20, y + 7), edge=REFERENCE, width=1.2, dashes=(4, 2.5))
+        page.area(
+            shapely.box(x, y - 7, x + 20, y + 7), edge=REFERENCE, width=1.2, dashes=(4.0, 2.5)
+        )
     elif mark in ("collision", "outside", "both"):
         draw_alarm(page, shapely.box(x, y - 7, x + 20, y + 7))
     else:

@@ -37,7 +37,7 @@ class Label:
 
 def place_names(plan: Plan, measure: MeasureText) -> dict[int, Label]:
     """Return labels with the category, by object, for objects with enough room for theirs."""
-    blocked = [contact.shape for contact in plan.contacts]
+    blocked = _marks(plan)
     blocked.append(shapely.Point(plan.camera).buffer(11.0))
     placed: dict[int, Label] = {}
     for position, piece in sorted(enumerate(plan.pieces), key=lambda item: -item[1].footprint.area):
@@ -71,14 +71,14 @@ def place_numbers(
     taken = [_rectangle(label, measure) for label in names.values()]
     taken.append(shapely.Point(plan.camera).buffer(11.0))
     taken += reserved
-    contacts = [contact.shape for contact in plan.contacts]
+    marks = _marks(plan)
     placed: dict[int, Label] = {}
     beside: list[Piece] = []
     for position, piece in enumerate(plan.pieces):
         if piece.index not in numbers:
             continue
         above = [other.footprint for other in plan.pieces[position + 1 :]]
-        label = _number_inside(piece, numbers[piece.index], [*above, *contacts, *taken], measure)
+        label = _number_inside(piece, numbers[piece.index], [*above, *marks, *taken], measure)
         if label is None:
             beside.append(piece)
         else:
@@ -95,6 +95,12 @@ def place_numbers(
         if label.leader is not None:
             leaders.append(shapely.LineString(label.leader))
     return placed
+
+
+def _marks(plan: Plan) -> list[shapely.Geometry]:
+    """Return the contacts and the tips of fronts, which labels should not cover."""
+    tips = [piece.tip for piece in plan.pieces]
+    return [contact.shape for contact in plan.contacts] + [tip for tip in tips if tip.area > 0]
 
 
 def _name_inside(
@@ -157,7 +163,7 @@ class _Ground:
 
     def __init__(self, plan: Plan, bounds: Bounds) -> None:
         self._footprints = np.array([piece.footprint for piece in plan.pieces])
-        self._contacts = np.array([contact.shape for contact in plan.contacts])
+        self._marks = np.array(_marks(plan))
         self._walls = np.array(shapely.get_parts(plan.walls))
         self._bounds = shapely.box(*bounds)
 
@@ -215,12 +221,13 @@ class _Ground:
             60.0 * _cover(rectangles, others, reach)
             + 60.0 * _cover(rectangles, own, reach)
             + 120.0 * _cover(rectangles, self._walls, reach)
-            + 60.0 * _cover(rectangles, self._contacts, reach)
+            + 60.0 * _cover(rectangles, self._marks, reach)
             + 0.6 * _length(lines, others, reach)
             + 150.0 * (_length(lines, labels, reach) > 0)
             + 150.0 * _meets(lines, web, reach)
             + 1e3 * _meets(rectangles, web, reach)
             + 1e4 * _cover(rectangles, labels, reach)
+            + 30.0 * _meets(_boxes(place, width + 26.0, height), labels, reach)
             + 1e5 * ~shapely.contains(self._bounds, rectangles)
         )
 

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int64
 
 from panoscene.geometry import OrientedBoxes, box_footprint, penetration_depth, wall_normals
 from panoscene.scene import CATEGORIES, Relations, Scene, relations_from_boxes
-from panoscene.views._style import MOST_WALL, OVERHEAD, WALL_THICKNESS
+from panoscene.views._style import MOST_WALL, NO_FRONT, OVERHEAD, WALL_THICKNESS
 
 TOLERANCE = 0.01
 """Metres of penetration, or of sticking out of the room, from which it is shown."""
@@ -50,6 +50,24 @@ class Piece:
     colliding: bool
     outside: shapely.Polygon | shapely.MultiPolygon
     """The part outside the room; empty when that is at most a centimetre."""
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Width and depth in pixels."""
+        width = float(np.linalg.norm(self.front[1] - self.front[0]))
+        return width, self.footprint.area / max(width, 1e-9)
+
+    @property
+    def tip(self) -> shapely.Polygon:
+        """The triangle before the front that shows where it faces; empty for small pieces."""
+        width, depth = self.extent
+        length = min(8.0, 0.3 * depth, 0.3 * width)
+        if length < 2.5 or self.category in NO_FRONT:
+            return shapely.Polygon()
+        middle = self.front.mean(0)
+        side = (self.front[1] - self.front[0]) / width * length
+        forward = np.array([-side[1], side[0]])
+        return shapely.Polygon([middle - side, middle + side, middle + forward])
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,6 +79,9 @@ GROUP_COLOURS = MappingProxyType(
 Seven are from Paul Tol's light scheme; mauve and pale grey are chosen to stay apart from them.
 """
 
+NO_FRONT = ("carpet", *GROUPS["doors and windows"])
+"""Categories whose fronts say nothing."""
+
 _GROUP = {category: group for group, members in GROUPS.items() for category in members}
 
 

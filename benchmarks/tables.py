@@ -1,0 +1,61 @@
+"""Writes the measured numbers of benchmarks/*.json into README.md and docs/.
+
+    panoscene bench arrange --json > benchmarks/arrange.json
+    panoscene experiment arrange --json > benchmarks/experiment.json
+    panoscene experiment safety --json > benchmarks/safety.json
+    python benchmarks/tables.py
+
+With --check it writes nothing and exits 1 when a table is stale.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+from panoscene.eval import benchmark_table, experiment_table
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = ("README.md", "docs/arrange.md")
+
+
+def tables() -> dict[str, str]:
+    """Return the text between the markers, by the markers' name."""
+    measured = {
+        name: json.loads((ROOT / "benchmarks" / f"{name}.json").read_text())
+        for name in ("arrange", "experiment", "safety")
+    }
+    machine = measured["arrange"]["machine"]
+    safety = measured["safety"]
+    outcomes = ", ".join(f"{count} {name}" for name, count in sorted(safety["outcomes"].items()))
+    return {
+        "benchmark": benchmark_table(measured["arrange"])
+        + f"\n\nMedians on {machine['processor']}, {machine['cores']} cores.",
+        "experiment": experiment_table(measured["experiment"])
+        + f"\n\n{measured['experiment']['scenes']} rooms, {measured['experiment']['objects']} objects.",
+        "safety": f"In {safety['scenes']:,} scenes without any sense (`panoscene experiment safety`), "
+        f"{safety['worse']} came out worse or not finite. Outcomes: {outcomes}.",
+    }
+
+
+def main() -> int:
+    """Update or check the pages."""
+    check = "--check" in sys.argv
+    stale = []
+    for page in PAGES:
+        path = ROOT / page
+        text = old = path.read_text()
+        for name, table in tables().items():
+            pattern = rf"(<!-- {name}:begin -->).*?(<!-- {name}:end -->)"
+            text = re.sub(pattern, lambda m, t=table: f"{m[1]}\n{t}\n{m[2]}", text, flags=re.DOTALL)
+        if text != old:
+            stale.append(page)
+            if not check:
+                path.write_text(text)
+    if stale:
+        print(("stale: " if check else "updated: ") + ", ".join(stale))
+    return int(check and bool(stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
