@@ -1,21 +1,48 @@
 """The fused gradient: view parameters to boxes, forces on the boxes, and the chain rule back.
 
-One set of formulas for two array libraries: ``k.xp`` is numpy for small scenes on the CPU, where
-the cost is the number of operations, and torch for large batches, other devices, and for
-unrolling (every operation here is differentiable). Only names that both libraries share are used.
+One set of formulas for two array libraries: ``k.xp`` is numpy on the CPU, where the cost of a small
+scene is the number of operations, and torch on other devices and for unrolling (every operation
+here is differentiable). Only names that both libraries share are used.
 
-Rows of a box: x, y, z, cos, -sin, sin, cos, half x, half y, half y, half x, half z, yaw; in this
-order the axes and the half sizes, plain and exchanged, are slices.
+The floor plane is the complex plane, x + iy: the right side of a box points to e^(i yaw), a turn is
+a product, and the footprint is centre + e^(i yaw) (+-half x +- i half y).
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from panoscene.arrange._kernel import Kernel
 from panoscene.arrange._terms import BEHIND
 
 # a numpy array or a torch tensor; both have the operators and methods used here
 Array = Any
+
+
+class _Boxes(NamedTuple):
+    """Boxes as the terms want them, "scenes n" each."""
+
+    place: Array
+    """Centre on the floor plane, complex."""
+    right: Array
+    """Unit vector of the right side, complex."""
+    z: Array
+    half_x: Array
+    half_y: Array
+    half_z: Array
+    yaw: Array
+    corner: Array
+    """Footprint corners about the centre in the box's own frame, complex, "scenes n 4"."""
+
+
+class _Slope(NamedTuple):
+    """dE/d(box), "scenes n" each; ``plane`` is complex, dE/dx + i dE/dy."""
+
+    plane: Array
+    z: Array
+    half_x: Array
+    half_y: Array
+    half_z: Array
+    yaw: Array
 
 
 def energy_gradient(x: Array, k: Kernel) -> Array:
@@ -31,144 +58,113 @@ def energy_gradient(x: Array, k: Kernel) -> Array:
     angle = xp.concatenate([lonlat, yaw[None]])
     sin_lon, sin_lat, sin = xp.sin(angle)
     cos_lon, cos_lat, cos = xp.cos(angle)
+    ahead = sin_lon + k.i * cos_lon
     distance = x[2]
     level = distance * cos_lat
-    at_x, at_y = level * sin_lon, level * cos_lon
-    half_x, half_y, half_z = xp.maximum(x[4:], k.smallest) * 0.5
-    box = xp.stack(
+    half = xp.maximum(x[4:], k.smallest) * 0.5
+    half_x, half_y, half_z = half
+    corner = half_x[..., None] * k.to_right + half_y[..., None] * k.to_front
+    z = k.camera + distance * sin_lat
+    box = _Boxes(level * ahead, cos + k.i * sin, z, half_x, half_y, half_z, yaw, corner)
+    corners = _corner_slope(box, k)
+    pairs, farther = _pair_slope(box, distance, k)
+    rise, grow = _height_slope(box, k)
+    plane, up = corners.plane + pairs.plane, corners.z + pairs.z + rise
+    turn = corners.yaw + pairs.yaw
+    # in the floor plane: along the line of sight, and across it
+    seen = plane * ahead.conj()
+    along = seen.real
+    out = k.stack(
         [
-            *[at_x, at_y, k.camera + distance * sin_lat],
-            *[cos, -sin, sin, cos],
-            *[half_x, half_y, half_y, half_x, half_z, yaw],
+            (-level * seen.imag - k.turning * turn) * k.scale[0],
+            distance * (up * cos_lat - sin_lat * along) * k.scale[1],
+            along * cos_lat + up * sin_lat + farther,
+            -turn,
+            corners.half_x + pairs.half_x,
+            corners.half_y + pairs.half_y,
+            corners.half_z + pairs.half_z + grow,
         ]
     )
-    force, side = _corner_forces(box, k)
-    by_x, by_y, by_z, by_half_x, by_half_y, by_half_z, by_yaw = _box_gradient(force, side, box)
-    pair_xy, pair_z, pair_half, pair_half_z, pair_yaw, farther = _pair_gradient(box, distance, k)
-    rise, grow = _height_gradient(box, k)
-    by_x, by_y, by_z = by_x + pair_xy[0], by_y + pair_xy[1], by_z + pair_z + rise
-    by_yaw = by_yaw + pair_yaw
-    along = by_x * sin_lon + by_y * cos_lon
-    out = xp.stack(
-        [
-            (by_x * at_y - by_y * at_x - k.turning * by_yaw) * k.scale[0],
-            distance * (by_z * cos_lat - sin_lat * along) * k.scale[1],
-            along * cos_lat + by_z * sin_lat + farther,
-            -by_yaw,
-            0.5 * (by_half_x + pair_half[0]) * (x[4] > k.smallest),
-            0.5 * (by_half_y + pair_half[1]) * (x[5] > k.smallest),
-            0.5 * (by_half_z + pair_half_z + grow) * (x[6] > k.smallest),
-        ]
-    )
+    # a size is twice the half, and stands still at its floor
+    out = out * k.halved * (x > k.lowest)
     away = (x - k.start) * k.observation_slope
     return out + xp.maximum(xp.minimum(away, k.one), -k.one) * k.observation_gain
 
 
-def _box_gradient(force: Array, side: Array, box: Array) -> Array:
-    """Return rows (x, y, z, half x, half y, half z, yaw) of forces on corners.
-
-    ``force`` is dE/d(corner), ``side`` which corner as signs of right, front and up; both
-    "3 scenes n points".
-    """
-    cos, sin = box[3][..., None], box[5][..., None]
-    right = force[0] * cos + force[1] * sin
-    front = force[1] * cos - force[0] * sin
-    x, y, z = force.sum(-1)
-    half_x, half_y = (right * side[0]).sum(-1), (front * side[1]).sum(-1)
-    half_z = (force[2] * side[2]).sum(-1)
-    yaw = (front * side[0]).sum(-1) * box[7] - (right * side[1]).sum(-1) * box[8]
-    return x, y, z, half_x, half_y, half_z, yaw
-
-
-def _corner_forces(box: Array, k: Kernel) -> tuple[Array, Array]:
-    """Return the forces of walls and image on box corners, and which corners they act on."""
-    at_wall, wall_side = _wall_force(box, k)
-    at_image, image_side = _image_force(box, k)
-    return (
-        k.xp.concatenate([at_wall, at_image], -1),
-        k.xp.concatenate([wall_side, image_side], -1),
-    )
-
-
-def _footprint(
-    centre: tuple[Array, Array], axis: tuple[Array, Array], box: Array, k: Kernel
-) -> tuple[Array, Array]:
-    """Return the footprint corners, x and y each "scenes n 4", counter-clockwise.
-
-    ``axis`` is the cos and sin of the box's right side in the frame of ``centre``.
-    """
-    (x, y), (cos, sin) = centre, axis
-    right_x, right_y = (cos * box[7])[..., None], (sin * box[7])[..., None]
-    front_x, front_y = (sin * box[8])[..., None], (cos * box[8])[..., None]
-    to_right, to_front = k.corner_sign[0, :4], k.corner_sign[1, :4]
-    return (
-        x[..., None] + right_x * to_right - front_x * to_front,
-        y[..., None] + right_y * to_right + front_y * to_front,
-    )
-
-
-def _wall_force(box: Array, k: Kernel) -> tuple[Array, Array]:
-    """Return dE/d(corner) of the wall collision [wc] for the footprint corners."""
+def _corner_slope(box: _Boxes, k: Kernel) -> _Slope:
+    """Return dE/d(box) of the terms that act on corners: walls [wc] and image [bp]."""
     xp = k.xp
-    corner_x, corner_y = _footprint((box[0], box[1]), (box[3], box[5]), box, k)
-    start_x, start_y, edge_x, edge_y, inverse, slant = k.edge
-    from_x = corner_x[..., None] - start_x
-    from_y = corner_y[..., None] - start_y
-    along = (from_x * edge_x + from_y * edge_y) * inverse
-    along = xp.maximum(xp.minimum(along, k.one), k.zero)
-    away_x, away_y = from_x - along * edge_x, from_y - along * edge_y
-    squared = away_x * away_x + away_y * away_y
+    at_image, lift, corner = _image_force(box, k)
+    force = xp.concatenate([_wall_force(box, k), at_image], -1)
+    side = xp.concatenate([k.wall_side, k.plane_side[corner]], -1)
+    own = force * box.right.conj()[..., None]
+    right, front = own.real, own.imag
+    to_right, to_front = side.real, side.imag
+    yaw = (front * to_right).sum(-1) * box.half_x - (right * to_front).sum(-1) * box.half_y
+    return _Slope(
+        force.sum(-1),
+        lift.sum(-1),
+        (right * to_right).sum(-1),
+        (front * to_front).sum(-1),
+        (lift * k.up_side[corner]).sum(-1),
+        yaw,
+    )
+
+
+def _wall_force(box: _Boxes, k: Kernel) -> Array:
+    """Return dE/d(footprint corner) of the wall collision [wc], complex "scenes n 4"."""
+    xp = k.xp
+    corner = box.place[..., None] + box.right[..., None] * box.corner
+    offset = corner[..., None] - k.wall_start
+    along = (offset * k.wall_scale).real
+    away = offset - xp.maximum(xp.minimum(along, k.one), k.zero) * k.wall_edge
+    squared = away.real * away.real + away.imag * away.imag
     nearest = k.wall_base + squared.argmin(-1)
-    crossed = ((from_y < 0) != (from_y < edge_y)) & (from_x < from_y * slant)
+    level = offset.imag
+    crossed = ((level < 0) != (level < k.wall_edge.imag)) & (offset.real < level * k.wall_slant)
     sign = xp.where(crossed.sum(-1) % 2 == 1, -k.one, k.one)
     distance = xp.sqrt(squared.reshape(-1)[nearest] + 1e-18)
     error = xp.maximum(distance * sign + k.clearance / 2, k.zero)
-    push = k.wall_gain * xp.minimum(error * k.wall_slope, k.one) * (sign / distance)
-    force_x = away_x.reshape(-1)[nearest] * push
-    force_y = away_y.reshape(-1)[nearest] * push
-    return xp.stack([force_x, force_y, xp.zeros_like(push)]), k.wall_side
+    push = k.wall_gain * xp.minimum(error * k.wall_slope, k.one) * sign / distance
+    return away.reshape(-1)[nearest] * push
 
 
-def _image_force(box: Array, k: Kernel) -> tuple[Array, Array]:
-    """Return dE/d(corner) of the reprojection [bp] for the four corners that bound the view."""
+def _image_force(box: _Boxes, k: Kernel) -> tuple[Array, Array, Array]:
+    """Return the reprojection's dE/d(corner) for the four corners that bound the view [bp].
+
+    In the floor plane (complex) and upwards, and which of the eight corners; "scenes n 4" each.
+    """
     xp = k.xp
-    sin_lon, cos_lon, sin_lat, cos_lat = k.turn
-    axis = box[3] * cos_lon - box[5] * sin_lon, box[5] * cos_lon + box[3] * sin_lon
-    centre = box[0] * cos_lon - box[1] * sin_lon, box[0] * sin_lon + box[1] * cos_lon
-    x, y = _footprint(centre, axis, box, k)
-    z0 = box[2] - k.camera
-    x, y = x[..., None, :], y[..., None, :]
-    z = (z0[..., None] + box[11][..., None] * k.low_high)[..., None]
-    sin_lat, cos_lat = sin_lat[..., None, None], cos_lat[..., None, None]
-    forward, up = y * cos_lat + z * sin_lat, z * cos_lat - y * sin_lat
-    level = xp.sqrt(x * x + forward * forward + 1e-12)
-    shape = (*box.shape[1:], 8)
-    lon = xp.arctan2(x + 0 * forward, forward).reshape(shape)
-    lat = xp.arctan2(up, level).reshape(shape)
+    at = (box.place * k.turn)[..., None] + (box.right * k.turn)[..., None] * box.corner
+    aside = at.real
+    z = (box.z - k.camera)[..., None] + box.half_z[..., None] * k.low_high
+    # forward and up of the camera that is turned to the BFoV's centre
+    tilted = (at.imag[..., None, :] + k.i * z[..., None]) * k.pitch[..., None, None]
+    forward, up = tilted.real, tilted.imag
+    squared = (aside * aside)[..., None, :] + forward * forward + 1e-12
+    shape = (*box.z.shape, 8)
+    lon = xp.arctan2(aside[..., None, :], forward).reshape(shape)
+    lat = xp.arctan2(up, xp.sqrt(squared)).reshape(shape)
     # order: lon high, lon low, lat high, lat low
-    corner = xp.stack([lon.argmax(-1), lon.argmin(-1), lat.argmax(-1), lat.argmin(-1)], -1)
+    corner = k.stack_last([lon.argmax(-1), lon.argmin(-1), lat.argmax(-1), lat.argmin(-1)])
     place = k.corner_base + corner
-    wide, tall = place[..., :2], place[..., 2:]
-    lon_edge, lat_edge = lon.reshape(-1)[wide], lat.reshape(-1)[tall]
-    edge = xp.concatenate([lon_edge, lat_edge], -1)
+    lon_edge = lon.reshape(-1)[place[..., :2]]
+    edge = xp.concatenate([lon_edge, lat.reshape(-1)[place[..., 2:]]], -1)
     seen = (xp.abs(lon_edge) < BEHIND).all(-1)[..., None]
     slope = _rectangle_slope(edge, k) * seen
-    tx = x.reshape(-1)[k.footprint_base + corner % 4]
-    ty, tz = forward.reshape(-1)[place], up.reshape(-1)[place]
-    squared = tx * tx + ty * ty + 1e-12
-    # lon: (ty, -tx, 0) / squared; lat: (-tz tx, -tz ty, squared) / (level (squared + tz^2))
-    by_lon = slope[..., :2] / squared[..., :2]
-    flat = squared[..., 2:]
-    by_lat = slope[..., 2:] / (xp.sqrt(flat) * (flat + tz[..., 2:] * tz[..., 2:]))
-    tilt = by_lat * tz[..., 2:]
-    fx = xp.concatenate([by_lon * ty[..., :2], -tilt * tx[..., 2:]], -1)
-    fy = xp.concatenate([-by_lon * tx[..., :2], -tilt * ty[..., 2:]], -1)
-    fz = xp.concatenate([xp.zeros_like(by_lon), by_lat * flat], -1)
-    sin_lat, cos_lat = sin_lat[..., 0], cos_lat[..., 0]
-    ahead, rise = fy * cos_lat - fz * sin_lat, fy * sin_lat + fz * cos_lat
-    sin_lon, cos_lon = sin_lon[..., None], cos_lon[..., None]
-    force = xp.stack([fx * cos_lon + ahead * sin_lon, ahead * cos_lon - fx * sin_lon, rise])
-    return force, k.corner_sign[:, corner]
+    bound = tilted.reshape(-1)[place]
+    bound_plane = aside.reshape(-1)[k.footprint_base + corner % 4] + k.i * bound.real
+    squared = squared.reshape(-1)[place]
+    wide, tall = squared[..., :2], squared[..., 2:]
+    height = bound.imag[..., 2:]
+    by_lat = slope[..., 2:] / (xp.sqrt(tall) * (tall + height * height))
+    # lon: (forward, -aside, 0) / squared; lat: (-up aside, -up forward, squared) / (level r^2)
+    factor = xp.concatenate([-k.i * (slope[..., :2] / wide), -by_lat * height], -1)
+    lift = xp.concatenate([xp.zeros_like(wide), by_lat * tall], -1)
+    force = factor * bound_plane
+    upright = (force.imag + k.i * lift) * k.pitch.conj()[..., None]
+    plane = (force.real + k.i * upright.real) * k.turn.conj()[..., None]
+    return plane, upright.imag, corner
 
 
 def _rectangle_slope(edge: Array, k: Kernel) -> Array:
@@ -194,85 +190,80 @@ def _rectangle_slope(edge: Array, k: Kernel) -> Array:
     return gain * xp.stack([at_high, at_low], -1).reshape(edge.shape)
 
 
-def _height_gradient(box: Array, k: Kernel) -> tuple[Array, Array]:
+def _height_slope(box: _Boxes, k: Kernel) -> tuple[Array, Array]:
     """Return rows (z, half z) of the floor and ceiling terms [fc, cc, fa, ca]."""
     xp = k.xp
-    error = xp.maximum(k.height_offset + k.height_z * box[2] + k.height_half * box[11], k.zero)
+    error = xp.maximum(k.height_offset + k.height_z * box.z + k.height_half * box.half_z, k.zero)
     push = k.height_gain * xp.minimum(error * k.height_slope, k.one)
     return (push * k.height_z).sum(0), (push * k.height_half).sum(0)
 
 
-def _pair_gradient(box: Array, distance: Array, k: Kernel) -> tuple[Array, ...]:
-    """Return rows (xy, z, half xy, half z, yaw) of [oc, oa, rr], and dE/d(distance) of [rd]."""
+def _pair_slope(box: _Boxes, distance: Array, k: Kernel) -> tuple[_Slope, Array]:
+    """Return dE/d(box) of the pair terms [oc, oa, rr], and dE/d(distance) of [rd]."""
     xp = k.xp
-    subject = box[..., None]
-    other = xp.concatenate([box, k.walls], -1)[:, :, None, :]
-    gap_x, gap_y, gap_z = other[:3] - subject[:3]
-    own_half, own_swapped = subject[7:9], subject[9:11]
-    half, swapped = other[7:9], other[9:11]
-    along_own = subject[3:5] * gap_x + subject[5:7] * gap_y
-    along_other = other[3:5] * gap_x + other[5:7] * gap_y
-    # cos of the relative yaw, and minus its sin
-    turn = subject[3] * other[3:5] + subject[5] * other[5:7]
-    by_cos, by_sin = xp.abs(turn)
-    margin = xp.concatenate(
+    plane = xp.concatenate([k.stack([box.place, box.right]), k.wall_planes], -1)[:, :, None]
+    rows = [box.z, box.half_x, box.half_y, box.half_z, box.yaw]
+    z, wide, deep, tall, yaw = xp.concatenate([k.stack(rows), k.wall_rows], -1)[:, :, None]
+    place, right = plane
+    own_z, own_wide, own_deep, own_tall, own_yaw = (row[..., None] for row in rows)
+    back = box.right.conj()[..., None]
+    gap, up = place - box.place[..., None], z - own_z
+    own, other, turn = gap * back, gap * right.conj(), right * back
+    cos, sin = turn.real, turn.imag
+    by_cos, by_sin = xp.abs(cos), xp.abs(sin)
+    margin = k.stack(
         [
-            own_half + by_cos * half + by_sin * swapped - xp.abs(along_own),
-            half + by_cos * own_half + by_sin * own_swapped - xp.abs(along_other),
-            (subject[11] + other[11] - xp.abs(gap_z))[None],
+            own_wide + by_cos * wide + by_sin * deep - xp.abs(own.real),
+            own_deep + by_sin * wide + by_cos * deep - xp.abs(own.imag),
+            wide + by_cos * own_wide + by_sin * own_deep - xp.abs(other.real),
+            deep + by_sin * own_wide + by_cos * own_deep - xp.abs(other.imag),
+            own_tall + tall - xp.abs(up),
         ]
     )
-    push = _collision_push(margin, k) + _touching_push(margin, k)
-    own, others, up = push[:2], push[2:4], push[4]
-    slide, slide_other = own * xp.sign(along_own), others * xp.sign(along_other)
-    sign = xp.sign(turn)
-    yaw = (
-        sign[1] * turn[0] * (own * swapped + others * own_swapped).sum(0)
-        - sign[0] * turn[1] * (own * half + others * own_half).sum(0)
-        - slide[0] * along_own[1]
-        + slide[1] * along_own[0]
-        + _yaw_push(subject[12], other[12], k)
-    ).sum(-1)
-    along_x, along_y = slide.sum(-1)
-    by_x = along_x * box[3] + along_y * box[4] + (slide_other * other[3:5]).sum(0).sum(-1)
-    by_y = along_x * box[5] + along_y * box[6] + (slide_other * other[5:7]).sum(0).sum(-1)
-    straight, crosswise = (others * by_cos).sum(-1), (others * by_sin).sum(-1)
-    wide, deep = own.sum(-1)
-    by_half = (wide + straight[0] + crosswise[1], deep + straight[1] + crosswise[0])
+    push = _collision_push(margin, k) - _touching_push(margin, k)
+    p0, p1, p2, p3, lift = push
+    slide = p0 * xp.sign(own.real) + k.i * (p1 * xp.sign(own.imag))
+    slide_other = p2 * xp.sign(other.real) + k.i * (p3 * xp.sign(other.imag))
+    by_turn = (
+        xp.sign(cos) * sin * (p0 * wide + p1 * deep + p2 * own_wide + p3 * own_deep)
+        - xp.sign(sin) * cos * (p0 * deep + p1 * wide + p2 * own_deep + p3 * own_wide)
+        + (slide * own.conj()).imag
+        + _yaw_push(own_yaw, yaw, k)
+    )
+    slope = _Slope(
+        slide.sum(-1) * box.right + (slide_other * right).sum(-1),
+        (lift * xp.sign(up)).sum(-1),
+        (p0 + p2 * by_cos + p3 * by_sin).sum(-1),
+        (p1 + p2 * by_sin + p3 * by_cos).sum(-1),
+        lift.sum(-1),
+        by_turn.sum(-1),
+    )
     nearer = distance[..., None, :] - distance[..., None]
     farther = k.farther_back * xp.minimum(xp.maximum(-nearer, k.zero) * k.farther_back_slope, k.one)
     nearer = k.farther_gain * xp.minimum(xp.maximum(nearer, k.zero) * k.farther_slope, k.one)
-    return (
-        (by_x, by_y),
-        (up * xp.sign(gap_z)).sum(-1),
-        by_half,
-        up.sum(-1),
-        yaw,
-        (farther - nearer).sum(-1),
-    )
+    return slope, (farther - nearer).sum(-1)
 
 
 def _collision_push(margin: Array, k: Kernel) -> Array:
     """Return dE/d(margin) of the object-object collision, "5 scenes n m"."""
     xp = k.xp
-    margin = margin + k.clearance
-    least = xp.amin(margin, 0)
+    least = k.least(margin)
     if k.depth:
-        error = xp.maximum(least, k.zero)
+        error = xp.maximum(least + k.clearance, k.zero)
         push = k.collision_gain * xp.minimum(error * k.collision_slope, k.one)
         return (margin == least) * push
-    error = (margin * k.axis_weight).sum(0) * (least > 0)
+    margin = margin + k.clearance
+    error = (margin * k.axis_weight).sum(0) * (least + k.clearance > 0)
     push = k.collision_gain * xp.minimum(error * k.collision_slope, k.one)
     return push * k.axis_weight
 
 
 def _touching_push(margin: Array, k: Kernel) -> Array:
-    """Return dE/d(margin) of the contact relations, "5 scenes n m"."""
+    """Return -dE/d(margin) of the contact relations, "5 scenes n m"."""
     xp = k.xp
-    gap = -margin - k.clearance
-    apart = xp.maximum(gap, k.zero) * k.axis_weight
+    apart = xp.maximum(-k.clearance - margin, k.zero) * k.axis_weight
     push = k.touching_gain * xp.minimum(apart.sum(0) * k.touching_slope, k.one)
-    return -push * k.axis_weight * (gap > 0)
+    return xp.sign(apart) * k.axis_weight * push
 
 
 def _yaw_push(yaw: Array, other: Array, k: Kernel) -> Array:

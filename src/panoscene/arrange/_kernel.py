@@ -4,11 +4,15 @@
 The formulas use only differentiable tensor operations, so that a solve can be unrolled through.
 
 Layout of the tensors: components first, then scenes, subjects (n) and objects (n + m: the
-objects and behind them the walls). The gradient of a symmetric pair term is taken for the
-subject only; the other half appears when the roles are exchanged.
+objects and behind them the walls). Places on the floor are complex, x + iy. The gradient of a
+symmetric pair term is taken for the subject only; the other half appears when the roles are
+exchanged.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -31,6 +35,13 @@ class Kernel:
     """
 
     xp: ModuleType
+    stack: Callable[[list[Any]], Any]
+    """Join along a new first axis."""
+    stack_last: Callable[[list[Any]], Any]
+    least: Callable[[Any], Any]
+    """Smallest along the first axis."""
+    i: Any
+    """The imaginary unit, in the precision of the problem."""
     turning: float
     clearance: float
     depth: bool
@@ -41,7 +52,8 @@ class Kernel:
     scale: Any
     start: Any
     camera: Any
-    walls: Any
+    wall_planes: Any
+    wall_rows: Any
     axis_weight: Any
     collision_gain: Any
     touching_slope: Any
@@ -53,7 +65,10 @@ class Kernel:
     farther_gain: Any
     farther_back_slope: Any
     farther_back: Any
-    edge: Any
+    wall_start: Any
+    wall_edge: Any
+    wall_scale: Any
+    wall_slant: Any
     wall_slope: Any
     wall_gain: Any
     wall_base: Any
@@ -68,7 +83,13 @@ class Kernel:
     turn: Any
     edge_target: Any
     reprojection_gain: Any
-    corner_sign: Any
+    to_right: Any
+    to_front: Any
+    plane_side: Any
+    up_side: Any
+    pitch: Any
+    halved: Any
+    lowest: Any
     corner_base: Any
     footprint_base: Any
     low_high: Any
@@ -83,7 +104,17 @@ class Kernel:
             name: value.detach().numpy() if isinstance(value, Tensor) else value
             for name, value in values.items()
         }
-        return Kernel(**{**arrays, "xp": np})
+        library = {
+            "xp": np,
+            "stack": np.array,
+            "stack_last": _stack_last,
+            "least": np.minimum.reduce,
+        }
+        return Kernel(**{**arrays, **library})
+
+
+def _stack_last(rows: list[Any]) -> Any:
+    return np.array(rows).transpose(1, 2, 0)
 
 
 def make_kernel(problem: Problem) -> Kernel:
@@ -104,15 +135,9 @@ def make_kernel(problem: Problem) -> Kernel:
         return scale[name][:, None] * weight
 
     walls = batch.walls
-    cos, sin = torch.cos(walls.yaw), torch.sin(walls.yaw)
-    wide, deep, tall = (walls.size / 2).unbind(-1)
-    wall_rows = torch.cat(
-        [
-            walls.centre.movedim(-1, 0),
-            torch.stack([cos, -sin, sin, cos]),
-            torch.stack([wide, deep, deep, wide, tall, walls.yaw]),
-        ]
-    )
+    right = torch.polar(torch.ones_like(walls.yaw), walls.yaw)
+    wall_half = (walls.size / 2).unbind(-1)
+    imaginary = torch.complex(one * 0, one)
     no_wall = torch.zeros_like(conf.touching_wall)
     back = conf.relative_yaw.transpose(-1, -2)
     yaw_weight = torch.stack(
@@ -136,8 +161,8 @@ def make_kernel(problem: Problem) -> Kernel:
     )
     farther, nearer = conf.farther_than, conf.farther_than.transpose(-1, -2)
     # corners: eight in the paper, of which the upper and lower four share their place
-    edge = torch.roll(batch.polygon, -1, dims=1) - batch.polygon
-    length = (edge * edge).sum(-1)
+    corner = torch.complex(*batch.polygon.unbind(-1))[:, None, None, :]
+    edge = torch.roll(corner, -1, dims=-1) - corner
     floor, ceiling = batch.floor_height[:, None], batch.ceiling_height[:, None]
     corners = 4.0 if settings.reduction == "mean" else 1.0
     other = 4.0 if settings.reduction == "mean" else 0.0
@@ -169,21 +194,25 @@ def make_kernel(problem: Problem) -> Kernel:
     lon, lat, wide, tall = batch.bfov.unbind(-1)
     duplicate = 1.0 if settings.duplicate_axes else 0.5
     bits = torch.arange(8, device=one.device)
-    sign = torch.stack([bits % 4, bits % 4, bits // 4])
     table = torch.tensor([_CORNER_X, _CORNER_Y], dtype=one.dtype, device=one.device)
-    corner_sign = torch.stack([table[0][sign[0]], table[1][sign[1]], sign[2] * 2.0 - 1.0])
+    side_x, side_y = table[0][bits % 4], table[1][bits % 4]
     scenes, n = batch.valid.shape
     near = settings.clearance / 2
     m = batch.polygon.shape[1]
     count = torch.arange(scenes * n * 4, device=one.device)
     return Kernel(
         xp=torch,
+        stack=torch.stack,
+        stack_last=partial(torch.stack, dim=-1),
+        least=partial(torch.amin, dim=0),
+        i=imaginary,
         origin=problem.direction_origin,
         scale=problem.direction_scale,
         start=problem.start,
         camera=batch.camera_height[:, None],
         turning=1.0 if problem.view_relative else 0.0,
-        walls=wall_rows,
+        wall_planes=torch.stack([torch.complex(*walls.centre.unbind(-1)[:2]), right]),
+        wall_rows=torch.stack([walls.centre[..., 2], *wall_half, walls.yaw]),
         axis_weight=duplicate * one.new_tensor([1, 1, 1, 1, 2]).view(5, 1, 1, 1),
         clearance=settings.clearance,
         depth=settings.collision == "depth",
@@ -198,16 +227,10 @@ def make_kernel(problem: Problem) -> Kernel:
         farther_gain=pair("farther_than", farther),
         farther_back_slope=nearer / beta,
         farther_back=pair("farther_than", nearer),
-        edge=torch.stack(
-            [
-                batch.polygon[..., 0],
-                batch.polygon[..., 1],
-                edge[..., 0],
-                edge[..., 1],
-                1 / length.clamp(min=1e-12),
-                edge[..., 0] / torch.where(edge[..., 1].abs() < 1e-12, one, edge[..., 1]),
-            ]
-        )[:, :, None, None, :],
+        wall_start=corner,
+        wall_edge=edge,
+        wall_scale=edge.conj().resolve_conj() / (edge * edge.conj()).real.clamp(min=1e-12),
+        wall_slant=edge.real / torch.where(edge.imag.abs() < 1e-12, one, edge.imag),
         wall_slope=(conf.inside_room / beta)[..., None],
         wall_gain=(2 * single("wall_collision", conf.inside_room))[..., None],
         height_offset=torch.stack(
@@ -223,14 +246,20 @@ def make_kernel(problem: Problem) -> Kernel:
         height_gain=height_scale * height_weight,
         observation_slope=observation / beta,
         observation_gain=observation_scale * observation,
-        turn=torch.stack([lon.sin(), lon.cos(), lat.sin(), lat.cos()]),
+        turn=torch.polar(torch.ones_like(lon), lon),
+        pitch=torch.polar(torch.ones_like(lat), -lat),
         edge_target=torch.stack([wide, -wide, tall, -tall], -1) / 2,
         reprojection_gain=single("reprojection", conf.reprojection)[..., None],
         reprojection_slope=1 / beta,
         overlap=settings.projection == "iou",
-        corner_sign=corner_sign,
+        to_right=side_x[:4],
+        to_front=side_y[:4] * imaginary,
+        plane_side=torch.complex(side_x, side_y),
+        up_side=torch.where(bits < 4, -one, one),
+        halved=one.new_tensor([1, 1, 1, 1, 0.5, 0.5, 0.5]).view(7, 1, 1),
+        lowest=one.new_tensor([-math.inf] * 4 + [SMALLEST_SIZE] * 3).view(7, 1, 1),
         wall_base=(count * m).view(scenes, n, 4),
-        wall_side=corner_sign[:, None, None, :4].expand(3, scenes, n, 4),
+        wall_side=torch.complex(side_x, side_y)[:4].expand(scenes, n, 4),
         corner_base=(count[: scenes * n] * 8).view(scenes, n, 1),
         footprint_base=(count[: scenes * n] * 4).view(scenes, n, 1),
         low_high=one.new_tensor([-1, 1]),
