@@ -13,7 +13,7 @@ import re
 import sys
 from pathlib import Path
 
-from panoscene.eval import benchmark_table, experiment_table
+from panoscene.eval import benchmark_table, experiment_table, safety_table
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ("README.md", "docs/arrange.md")
@@ -26,15 +26,13 @@ def tables() -> dict[str, str]:
         for name in ("arrange", "experiment", "safety")
     }
     machine = measured["arrange"]["machine"]
-    safety = measured["safety"]
-    outcomes = ", ".join(f"{count} {name}" for name, count in sorted(safety["outcomes"].items()))
+    rooms = measured["experiment"]
     return {
         "benchmark": benchmark_table(measured["arrange"])
         + f"\n\nMedians on {machine['processor']}, {machine['cores']} cores.",
         "experiment": experiment_table(measured["experiment"])
-        + f"\n\n{measured['experiment']['scenes']} rooms, {measured['experiment']['objects']} objects.",
-        "safety": f"In {safety['scenes']:,} scenes without any sense (`panoscene experiment safety`), "
-        f"{safety['worse']} came out worse or not finite. Outcomes: {outcomes}.",
+        + f"\n\n{rooms['scenes']} rooms, {rooms['objects']} objects.",
+        "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
     }
 
 

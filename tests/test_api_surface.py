@@ -17,6 +17,7 @@ PACKAGES = [
     "panoscene.synth",
     "panoscene.eval",
     "panoscene.views",
+    "panoscene.sample",
 ]
 INVENTORY = Path(__file__).with_name("api_surface.json")
 

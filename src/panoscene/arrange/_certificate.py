@@ -96,6 +96,11 @@ class Measures:
         ]
         return Measures(*[torch.where(mask.view(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs])
 
+    def split(self, parts: int) -> "list[Measures]":
+        """Return the measures of as many equal parts of the scenes, in order."""
+        columns = [getattr(self, field.name).chunk(parts) for field in fields(Measures)]
+        return [Measures(*part) for part in zip(*columns, strict=True)]
+
     def columns(self) -> Float[Tensor, "scenes measures"]:
         """Return everything that must not grow: energy, collisions, out-of-room."""
         return torch.stack(

@@ -1,10 +1,11 @@
 """What one solve keeps constant: variables' units, weights and targets as tensors."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.arrange._batch import ArrangementBatch
@@ -240,6 +241,31 @@ def _term_scales(
     return {name: weight / entries[name] for name, weight in by_name.items()}
 
 
-def scene_mask(batch: ArrangementBatch) -> Bool[Tensor, "7 scenes n"]:
-    """Return which variables belong to real objects."""
-    return batch.valid[None].expand(7, -1, -1)
+def repeat_problem(problem: Problem, times: int) -> Problem:
+    """Return the problem of the same scenes several times over, one behind the other.
+
+    Judging several states at once costs little more than judging one when scenes are few.
+    """
+
+    def scenes_first(record: Any) -> Any:
+        values = {}
+        for field in fields(record):
+            value = getattr(record, field.name)
+            values[field.name] = (
+                value.repeat(times, *[1] * (value.ndim - 1))
+                if isinstance(value, Tensor)
+                else scenes_first(value)
+            )
+        return type(record)(**values)
+
+    return replace(
+        problem,
+        batch=scenes_first(problem.batch),
+        confidence=scenes_first(problem.confidence),
+        scale={name: value.repeat(times) for name, value in problem.scale.items()},
+        yaw_target=problem.yaw_target.repeat(times, 1, 1),
+        yaw_target_wall=problem.yaw_target_wall.repeat(times, 1, 1),
+        start=problem.start.repeat(1, times, 1),
+        direction_scale=problem.direction_scale.repeat(1, times, 1),
+        direction_origin=problem.direction_origin.repeat(1, times, 1),
+    )

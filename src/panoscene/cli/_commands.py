@@ -18,6 +18,7 @@ from panoscene.cli._options import (
     Output,
     SceneFile,
     Subject,
+    Trial,
 )
 
 
@@ -217,10 +218,10 @@ def bench(subject: Subject, *, repeats: Count = 5, json: Flag = False) -> int:
 
 
 def experiment(
-    subject: Subject,
+    subject: Trial,
     *,
     output: OptionalOutput = None,
-    scenes: Count = 100,
+    scenes: OptionalCount = None,
     seed: Count = 0,
     json: Flag = False,
 ) -> int:
@@ -228,18 +229,23 @@ def experiment(
 
     For arrange: rooms are disturbed as an imperfect network would, and each preset repairs them
     with true and with corrupted relations; then the default without collisions, relations or
-    observations. The table compares boxes with the truth before and after. For example:
+    observations. The table compares boxes with the truth before and after.
+
+    For safety: scenes without any sense go through the default preset, which promises to make
+    none of them worse. For example:
 
         panoscene experiment arrange
         panoscene experiment arrange --scenes 20 --seed 1 -o results
+        panoscene experiment safety --scenes 1000
 
     Args:
         subject: What to examine.
-        output: Folder that also gets the table and all figures, as arrange.md and arrange.json.
-        scenes: How many rooms.
+        output: Folder that also gets the table and all figures, as arrange.md and arrange.json
+            (safety.md and safety.json).
+        scenes: How many rooms: 100 unless you say otherwise, or 10,000 in the safety trial.
         seed: Seed of everything random: the same seed gives the same rooms.
         json: Print the rows and the conditions as JSON.
     """
     from panoscene.cli._measure import run_experiment
 
-    return run_experiment(output, scenes=scenes, seed=seed, as_json=json)
+    return run_experiment(subject, output, scenes=scenes, seed=seed, as_json=json)

@@ -2,14 +2,19 @@
 
 import errno
 import os
-import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
-from panoscene.scene import PanoramaError, Scene, SceneFormatError, write_scene
+from panoscene.scene import (
+    PanoramaError,
+    Scene,
+    SceneFormatError,
+    write_atomically,
+    write_scene,
+)
 
 CERTIFICATE = ".certificate.json"
 """What the name of a certificate ends in; files named so are never taken for scenes."""
@@ -54,14 +59,7 @@ def write_text(path: Path, text: str) -> None:
 def write_bytes(path: Path, data: bytes) -> None:
     """Write bytes to a file that appears complete or not at all."""
     with writing(path):
-        target = path.resolve()
-        temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
-        try:
-            with temporary.open("xb") as stream:
-                stream.write(data)
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_atomically(path, data)
 
 
 def write_scene_from(source: Path, scene: Scene, target: Path) -> None:

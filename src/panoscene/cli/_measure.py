@@ -11,6 +11,8 @@ from panoscene.eval import (
     experiment_table,
     run_arrange_benchmark,
     run_arrange_experiment,
+    run_arrange_safety,
+    safety_table,
 )
 
 
@@ -26,20 +28,29 @@ def run_bench(repeats: int, *, as_json: bool) -> int:
     return 0
 
 
-def run_experiment(output: Path | None, *, scenes: int, seed: int, as_json: bool) -> int:
-    """Run the experiment of the optimiser and return the exit code."""
-    _at_least(1, "--scenes", scenes)
+def run_experiment(
+    subject: str, output: Path | None, *, scenes: int | None, seed: int, as_json: bool
+) -> int:
+    """Run an experiment on the optimiser and return the exit code.
+
+    Without ``scenes`` there are as many as the experiment needs to say something.
+    """
+    if scenes is not None:
+        _at_least(1, "--scenes", scenes)
     _at_least(0, "--seed", seed)
     if output is not None:
         # before the long run, not after it
         check_folder(output)
     with progress_words() as progress:
-        result = run_arrange_experiment(scenes=scenes, seed=seed, progress=progress)
-    table = experiment_table(result)
+        if subject == "safety":
+            result = run_arrange_safety(scenes=scenes or 10_000, seed=seed, progress=progress)
+        else:
+            result = run_arrange_experiment(scenes=scenes or 100, seed=seed, progress=progress)
+    table = (safety_table if subject == "safety" else experiment_table)(result)
     if output is not None:
-        write_text(output / "arrange.json", json_text(result) + "\n")
-        write_text(output / "arrange.md", table + "\n")
-        note(f"wrote {output}: arrange.json, arrange.md")
+        write_text(output / f"{subject}.json", json_text(result) + "\n")
+        write_text(output / f"{subject}.md", table + "\n")
+        note(f"wrote {output}: {subject}.json, {subject}.md")
     if as_json:
         say_json(result)
     else:

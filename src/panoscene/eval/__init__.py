@@ -6,4 +6,5 @@ from panoscene.eval._arrange_experiment import experiment_table as experiment_ta
 from panoscene.eval._arrange_experiment import run_arrange_experiment as run_arrange_experiment
 from panoscene.eval._arrange_safety import broken_promises as broken_promises
 from panoscene.eval._arrange_safety import run_arrange_safety as run_arrange_safety
+from panoscene.eval._arrange_safety import safety_table as safety_table
 from panoscene.eval._machine import machine_facts as machine_facts

@@ -74,3 +74,15 @@ def run_arrange_safety(
         "broken": dict(broken),
         "outcomes": dict(outcomes),
     }
+
+
+def safety_table(result: dict[str, object]) -> str:
+    """Return in one paragraph what ``run_arrange_safety`` found."""
+    outcomes = result["outcomes"]
+    if not isinstance(outcomes, dict):
+        raise TypeError(f"result: found outcomes {outcomes!r}, expected counts by name")
+    listed = ", ".join(f"{count} {name}" for name, count in sorted(outcomes.items()))
+    return (
+        f"Of {result['scenes']} scenes without any sense, {result['worse']} came out worse or not "
+        f"finite. What was done: {listed}."
+    )

@@ -1,5 +1,6 @@
 """The vocabulary: records, categories, relations, and the files that carry them."""
 
+from ._atomic import write_atomically as write_atomically
 from ._boxes_table import objects_from_boxes as objects_from_boxes
 from ._boxes_table import read_box_table as read_box_table
 from ._boxes_table import scene_from_boxes as scene_from_boxes

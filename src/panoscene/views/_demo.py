@@ -9,10 +9,9 @@ import numpy as np
 from panoscene.arrange import Certificate, Violations, arrange
 from panoscene.geometry import paired_box_iou
 from panoscene.sample import sample_room_path
-from panoscene.scene import Scene, read_scene, write_scene
+from panoscene.scene import Scene, read_scene, write_atomically, write_scene
 from panoscene.synth import PerturbNoise, perturb_scene
 from panoscene.views._birds_eye import draw_birds_eye, draw_comparison
-from panoscene.views._page import write_file
 
 DEMO_NOISE = PerturbNoise()
 """Errors of the size that networks make: 0.02 rad in direction, 8 % in distance, 10 % in each
@@ -80,7 +79,7 @@ def run_demo(output: Path, seed: int = 0) -> DemoResult:
     write_scene(disturbed, result.before)
     write_scene(repaired, result.after)
     text = json.dumps(certificate.as_dict(), indent=2) + "\n"
-    write_file(result.certificate, text.encode())
+    write_atomically(result.certificate, text)
     before, after = describe_violations(certificate.before), describe_violations(certificate.after)
     draw_birds_eye(
         disturbed, result.before_picture, title="Before", caption=before, reference=truth

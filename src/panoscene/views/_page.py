@@ -1,7 +1,6 @@
 """A sheet of paper measured in pixels: shapes and text in paint order, saved as a PNG."""
 
 import os
-import secrets
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -20,6 +19,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox, IdentityTransform
 
+from panoscene.scene import write_atomically
 from panoscene.views._style import FONT, INK, LABEL, PAPER
 
 _DPI = 100
@@ -169,7 +169,7 @@ class Page:
         """Write the page as a PNG that appears complete or not at all."""
         buffer = BytesIO()
         self._canvas.print_png(buffer, metadata={"Software": None})
-        write_file(Path(path), buffer.getvalue())
+        write_atomically(Path(path), buffer.getvalue())
 
     def _add(self, artist: Artist) -> None:
         self._drawn += 1
@@ -179,18 +179,6 @@ class Page:
         self._figure.add_artist(artist, clip=False)
         artist.set_clip_box(self._clip)
         artist.set_clip_on(self._clip is not None)
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file that appears complete or not at all; one that was there is replaced."""
-    target = path.resolve()
-    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
-    try:
-        with temporary.open("xb") as stream:
-            stream.write(content)
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _font(size: float, bold: bool) -> FontProperties:
