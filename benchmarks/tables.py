@@ -32,6 +32,9 @@ def tables() -> dict[str, str]:
         + f"\n\nMedians on {machine['processor']}, {machine['cores']} cores.",
         "experiment": experiment_table(measured["experiment"])
         + f"\n\n{rooms['scenes']} rooms, {rooms['objects']} objects.",
+        "experiment-short": experiment_table(
+            {"rows": [row for row in rooms["rows"] if "without" not in row["method"]]}
+        ),
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
     }
 

@@ -56,7 +56,7 @@ def test_mask_region_contains_whole_pixels_and_is_tight(seed, size):
         corners = pixel_corners(mask)
         assert contained(bfov, corners, 1e-4).all()
         # nearly as small as the fit to the corners of all pixels
-        assert bfov_area(bfov) <= bfov_area(bfov_from_directions(corners)) * 1.05 + 1e-3
+        assert bfov_area(bfov) <= bfov_area(bfov_from_directions(corners)) * 1.15 + 1e-3
 
 
 @settings(max_examples=15, deadline=None)

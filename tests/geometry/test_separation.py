@@ -135,7 +135,7 @@ def test_gap_adds_the_vertical_distance() -> None:
     assert gap(cube(2.0), above) == 4.0
 
 
-@given(yaw=st.floats(-4, 4), x=st.floats(-1.5, 1.5), width=st.floats(0.1, 2.0))
+@given(yaw=st.floats(-4, 4), x=st.floats(-0.9, 0.9), width=st.floats(0.1, 2.0))
 def test_moving_by_the_penetration_depth_separates(yaw: float, x: float, width: float) -> None:
     a = cube(2.0, yaw=0.4)
     b = OrientedBoxes(

@@ -86,7 +86,7 @@ class Thresholds(_Frozen):
 class ArrangementSettings(_Frozen):
     """Everything that defines one way of arranging; start from a preset and change fields.
 
-    Example:
+    Examples:
         >>> ArrangementSettings.preset("paper").steps
         100
         >>> PRESETS["default"].model_copy(update={"steps": 20}).steps

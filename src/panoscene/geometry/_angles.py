@@ -15,7 +15,7 @@ def wrap_angle(angle: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
     Convention:
         - pi itself becomes -pi, so that every direction has exactly one number
 
-    Example:
+    Examples:
         >>> wrap_angle(torch.tensor([0.0, 3.5]))
         tensor([ 0.0000, -2.7832])
     """

@@ -44,7 +44,7 @@ def bfov_from_directions(
     Raises:
         ValueError: If a batch entry has no valid point, or a valid one is zero or not finite.
 
-    Example:
+    Examples:
         >>> ahead = direction_from_lonlat(torch.tensor([[3.0, 0.0], [-3.0, 0.0]]))
         >>> [round(x, 4) for x in bfov_from_directions(ahead).tolist()]
         [-3.1416, 0.0, 0.2832, 0.0]
@@ -76,7 +76,7 @@ def bfov_from_contour(
         ValueError: If a valid v is outside [0, height], a batch entry has no valid point, or a
             valid coordinate is not finite.
 
-    Example:
+    Examples:
         >>> across_the_seam = torch.tensor([[1014.0, 256.0], [1034.0, 256.0]])
         >>> [round(x, 4) for x in bfov_from_contour(across_the_seam, 512, 1024).tolist()]
         [-3.1416, 0.0, 0.1227, 0.0]
@@ -104,7 +104,7 @@ def bfov_from_mask(mask: Bool[Tensor, "*batch height width"]) -> Float[Tensor, "
     Raises:
         ValueError: If a mask is empty (its index is named) or has no rows or columns.
 
-    Example:
+    Examples:
         >>> mask = torch.zeros(512, 1024, dtype=torch.bool)
         >>> mask[240:272, :16] = mask[240:272, -16:] = True
         >>> [round(x, 4) for x in bfov_from_mask(mask).tolist()]
@@ -150,7 +150,7 @@ def bfov_contains(
         - the border belongs to the region: |lon'| <= width / 2 and |lat'| <= height / 2 in the
           turned camera
 
-    Example:
+    Examples:
         >>> bfov = torch.tensor([3.1, 0.0, 0.4, 0.2])
         >>> behind = direction_from_lonlat(torch.tensor([[-3.1, 0.05], [-3.1, 0.15]]))
         >>> bfov_contains(bfov.expand(2, 4), behind)
@@ -169,7 +169,7 @@ def bfov_area(bfov: Float[Tensor, "*batch 4"]) -> Float[Tensor, "*batch"]:
     Convention:
         - width x 2 sin(height / 2), wherever the centre is
 
-    Example:
+    Examples:
         >>> bfov_area(torch.tensor([0.0, 1.0, 2 * torch.pi, torch.pi])) / torch.pi
         tensor(4.)
     """
@@ -185,7 +185,7 @@ def bfov_candidates(
     Raises:
         ValueError: If a batch entry has no valid point, or a valid one is zero or not finite.
 
-    Example:
+    Examples:
         >>> bfov_candidates(torch.tensor([[0.0, 1.0, 0.0], [0.1, 1.0, 0.1]])).shape
         torch.Size([16, 4])
     """
@@ -201,7 +201,7 @@ def bfov_candidates(
 def smallest_bfov(candidates: Float[Tensor, "*batch candidates 4"]) -> Float[Tensor, "*batch 4"]:
     """Return the first candidate, or the smallest one if that is at least 1 % smaller.
 
-    Example:
+    Examples:
         >>> smallest_bfov(torch.tensor([[0.0, 0.0, 0.2, 0.2], [0.1, 0.0, 0.2, 0.1]]))
         tensor([0.1000, 0.0000, 0.2000, 0.1000])
     """

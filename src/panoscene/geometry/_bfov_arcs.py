@@ -47,7 +47,7 @@ class BorderArcs:
 def border_arcs(bfov: Float[Tensor, "*batch 4"], shrink: float) -> BorderArcs:
     """Return the border of each BFoV in float64, after scaling its width and height by 1 - shrink.
 
-    Example:
+    Examples:
         >>> border_arcs(torch.tensor([0.0, 0.0, 0.2, 0.4]), 0.0).half
         tensor([0.1000, 0.1000, 0.2000, 0.2000], dtype=torch.float64)
     """

@@ -35,7 +35,7 @@ def bfov_intersection_area(
         ValueError: If a BFoV is not finite or its width or height is negative, or more than
             2 pi or pi.
 
-    Example:
+    Examples:
         >>> a = torch.tensor([[3.1, 0.0, 0.4, 0.2]])
         >>> b = torch.tensor([[-3.1, 0.0, 0.4, 0.2], [0.0, 0.0, 0.4, 0.2]])
         >>> [round(x, 4) for x in bfov_intersection_area(a, b)[0].tolist()]
@@ -60,7 +60,7 @@ def bfov_iou(a: Float[Tensor, "n 4"], b: Float[Tensor, "m 4"]) -> Float[Tensor, 
         ValueError: If a BFoV is not finite or its width or height is negative, or more than
             2 pi or pi.
 
-    Example:
+    Examples:
         >>> a = torch.tensor([[3.1, 0.0, 0.4, 0.2]])
         >>> b = torch.tensor([[3.1, 0.0, 0.4, 0.2], [-3.1, 0.0, 0.4, 0.2]])
         >>> [round(x, 4) for x in bfov_iou(a, b)[0].tolist()]
@@ -94,7 +94,7 @@ def bfov_nms(
     Raises:
         ValueError: If the threshold is outside [0, 1], a score is not finite, or a BFoV is bad.
 
-    Example:
+    Examples:
         >>> bfov = torch.tensor([[3.1, 0.0, 0.4, 0.2], [-3.1, 0.0, 0.4, 0.2], [0.0, 0.0, 0.4, 0.2]])
         >>> bfov_nms(bfov, torch.tensor([0.5, 0.9, 0.7]), iou_threshold=0.4).tolist()
         [1, 2]
@@ -134,7 +134,7 @@ def bfov_union(
     Raises:
         ValueError: If a batch entry has no valid region, or a valid one is not finite or too large.
 
-    Example:
+    Examples:
         >>> halves = torch.tensor([[3.0416, 0.0, 0.2, 0.3], [-3.0416, 0.0, 0.2, 0.3]])
         >>> [round(x, 3) for x in bfov_union(halves).tolist()]
         [-3.142, 0.0, 0.4, 0.3]

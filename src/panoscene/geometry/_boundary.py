@@ -21,7 +21,7 @@ def column_lon(
 ) -> Float[Tensor, " width"]:
     """Return the longitude in radians of the centre of each column of a panorama.
 
-    Example:
+    Examples:
         >>> column_lon(4)
         tensor([-2.3562, -0.7854,  0.7854,  2.3562])
     """
@@ -48,7 +48,7 @@ def boundary_from_layout(
 
     Source: HorizonNet's boundary target (facts: layout, ground truth).
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
         >>> ceiling_lat, floor_lat = boundary_from_layout(room, 0.0, 2.6, 1.6, width=4)
         >>> floor_lat
@@ -77,7 +77,7 @@ def corner_signal_from_layout(
 
     Source: HorizonNet's corner target (facts: layout, ground truth).
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
         >>> corner_signal_from_layout(room, width=8)
         tensor([0.9798, 0.9798, 0.9798, 0.9798, 0.9798, 0.9798, 0.9798, 0.9798])

@@ -98,7 +98,7 @@ def corner_peaks(
     column of a plateau, and none in a constant signal. Its longitude follows from the slopes on
     both sides, since the logarithm of the signal falls linearly from a corner.
 
-    Example:
+    Examples:
         >>> from panoscene.geometry._boundary import corner_signal_from_layout
         >>> room = torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]).double()
         >>> corner_peaks(corner_signal_from_layout(room, 512))[1] * 4 / torch.pi

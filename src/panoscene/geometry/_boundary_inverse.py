@@ -80,7 +80,7 @@ def layout_from_boundary(
         ValueError: if a signal is not finite, the lengths differ or are below 16, or
             ``camera_height`` or ``max_distance`` is not a positive number (max_distance > 1).
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[-2.0, -1.0], [3.0, -1.0], [3.0, 2.0], [-2.0, 2.0]])
         >>> ceiling_lat, floor_lat = boundary_from_layout(room, 0.0, 2.5, 1.6)
         >>> found = layout_from_boundary(ceiling_lat, floor_lat, torch.zeros(1024), 1.6)

@@ -52,7 +52,7 @@ def view_relative_yaw(
           0 faces away from the camera, -pi faces it; -lon - yaw, wrapped
         - ``lon`` is the longitude of the box centre, not of the BFoV centre
 
-    Example:
+    Examples:
         >>> lon = torch.tensor([0.5, 0.5])
         >>> view_relative_yaw(torch.tensor([-0.5, 0.0]), lon).tolist()
         [0.0, -0.5]
@@ -65,7 +65,7 @@ def yaw_from_view_relative(
 ) -> Float[Tensor, "*batch"]:
     """Return the world yaw in [-pi, pi): the inverse of ``view_relative_yaw``.
 
-    Example:
+    Examples:
         >>> yaw_from_view_relative(torch.tensor(0.0), torch.tensor(0.5)).item()
         -0.5
     """
@@ -87,7 +87,7 @@ def box_centre_from_view(
     Convention:
         - the camera is at (0, 0, camera_height)
 
-    Example:
+    Examples:
         >>> box_centre_from_view(torch.tensor([0.0, 0.0]), torch.tensor(2.0), 1.5).tolist()
         [0.0, 2.0, 1.5]
     """
@@ -120,7 +120,7 @@ def encode_boxes(
         ValueError: If a box is centred on the camera, a BFoV has no extent or a mean size is not
             positive.
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(
         ...     torch.tensor([0.0, 3.0, 1.6]), torch.ones(3), torch.tensor(-0.3))
         >>> bfov = torch.tensor([0.1, 0.0, 0.4, 0.4])
@@ -171,7 +171,7 @@ def decode_box_code(
     Raises:
         ValueError: If a bin does not exist.
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.tensor([0.0, 3.0, 1.0]), torch.ones(3), torch.tensor(-0.3))
         >>> bfov = torch.tensor([0.1, 0.0, 0.4, 0.4])
         >>> code = encode_boxes(box, bfov, torch.ones(3), camera_height=1.6)

@@ -45,7 +45,7 @@ def bfov_from_boxes(
         - a box that contains the camera, or touches it, covers the full sphere: (0, 0, 2 pi, pi)
         - nothing hides anything: walls and other boxes are not considered
 
-    Example:
+    Examples:
         >>> size = torch.full((3,), 2.0)
         >>> box = OrientedBoxes(torch.tensor([0.0, 3.0, 1.6]), size, torch.tensor(0.0))
         >>> [round(x, 4) for x in bfov_from_boxes(box, camera_height=1.6).tolist()]

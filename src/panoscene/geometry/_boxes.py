@@ -22,7 +22,7 @@ def box_corners(boxes: OrientedBoxes) -> Float[Tensor, "*batch 8 3"]:
               |/       |/
               0--------1
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.tensor([2.0, 4.0, 6.0]), torch.tensor(0.0))
         >>> box_corners(box)[[0, 1, 2, 4]].tolist()
         [[-1.0, -2.0, -3.0], [1.0, -2.0, -3.0], [-1.0, 2.0, -3.0], [-1.0, -2.0, 3.0]]
@@ -39,7 +39,7 @@ def box_footprint(boxes: OrientedBoxes) -> Float[Tensor, "*batch 4 2"]:
     Convention:
         - counter-clockwise from above, starting at the corner that is left and behind
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.tensor([2.0, 4.0, 6.0]), torch.tensor(0.0))
         >>> box_footprint(box).tolist()
         [[-1.0, -2.0], [1.0, -2.0], [1.0, 2.0], [-1.0, 2.0]]
@@ -53,7 +53,7 @@ def boxes_from_corners(corners: Float[Tensor, "*batch 8 3"]) -> OrientedBoxes:
     Corners that are not exactly those of an upright box give the box with their mean centre,
     mean edge lengths and mean heading.
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.5))
         >>> round(float(boxes_from_corners(box_corners(box)).yaw), 6)
         0.5
@@ -77,7 +77,7 @@ def world_from_object(boxes: OrientedBoxes) -> Float[Tensor, "*batch 4 4"]:
         - ``p_world = world_from_object @ p_object`` for homogeneous columns (x, y, z, 1)
         - box coordinates are not scaled by the size: a corner is at ``size / 2``
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.tensor([1.0, 2.0, 3.0]), torch.ones(3), torch.tensor(0.0))
         >>> (world_from_object(box) @ torch.tensor([0.0, 0.5, 0.0, 1.0])).tolist()
         [1.0, 2.5, 3.0, 1.0]
@@ -91,7 +91,7 @@ def object_from_world(boxes: OrientedBoxes) -> Float[Tensor, "*batch 4 4"]:
     Convention:
         - ``p_object = object_from_world @ p_world``: the inverse of ``world_from_object``
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.tensor([1.0, 2.0, 3.0]), torch.ones(3), torch.tensor(0.0))
         >>> (object_from_world(box) @ torch.tensor([1.0, 2.5, 3.0, 1.0])).tolist()
         [0.0, 0.5, 0.0, 1.0]
@@ -104,7 +104,7 @@ def box_contains(
 ) -> Bool[Tensor, "*batch points"]:
     """Return whether points of the world lie in each box; the surface belongs to the box.
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.0))
         >>> box_contains(box, torch.tensor([[0.5, 0.0, 0.0], [0.6, 0.0, 0.0]])).tolist()
         [True, False]
@@ -116,7 +116,7 @@ def box_contains(
 def box_volume(boxes: OrientedBoxes) -> Float[Tensor, "*batch"]:
     """Return the volume of each box in cubic metres.
 
-    Example:
+    Examples:
         >>> size = torch.tensor([2.0, 3.0, 4.0])
         >>> float(box_volume(OrientedBoxes(torch.zeros(3), size, torch.tensor(0.0))))
         24.0

@@ -43,7 +43,7 @@ def cube_from_panorama(
     Raises:
         ValueError: If ``size`` is not positive, or the mode does not suit the image.
 
-    Example:
+    Examples:
         >>> cube_from_panorama(torch.zeros(3, 64, 128), 32).shape
         torch.Size([6, 3, 32, 32])
     """
@@ -72,7 +72,7 @@ def panorama_from_cube(
     Raises:
         ValueError: If the panorama is empty, or the mode does not suit the faces.
 
-    Example:
+    Examples:
         >>> panorama_from_cube(torch.ones(6, 3, 32, 32), 64, 128).shape
         torch.Size([3, 64, 128])
     """

@@ -32,7 +32,7 @@ def wall_normals(polygon: Float[Tensor, "*batch corners 2"]) -> Float[Tensor, "*
         - counter-clockwise corners; wall i runs from corner i to corner i + 1
         - a wall without length (padding) has the normal (0, 1)
 
-    Example:
+    Examples:
         >>> wall_normals(torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))[1] + 0
         tensor([-1.,  0.])
     """
@@ -53,7 +53,7 @@ def wall_boxes(
 
     Source: paper, Sec. 3.3, walls as nodes of the relation graph.
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
         >>> wall_boxes(room, 0.0, 2.5).centre[1]
         tensor([2.1000, 0.0000, 1.2500])
@@ -85,7 +85,7 @@ def wall_distance(
         - lon runs clockwise from +y: the ray points along (sin lon, cos lon)
         - from outside the room, the first wall from outside; infinity where no wall is met
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[-2.0, -1.0], [2.0, -1.0], [2.0, 3.0], [-2.0, 3.0]])
         >>> wall_distance(room, torch.tensor([0.0, torch.pi / 2]))
         tensor([3., 2.])
@@ -114,7 +114,7 @@ def corner_visible(
         - padding by repeated corners changes nothing
         - from outside the room, the corners that are seen from outside
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[-1, -1], [3, -1], [3, 1], [1, 1], [1, 3], [-1, 3]]).float()
         >>> corner_visible(room, (2.5, 0.0))
         tensor([ True,  True,  True,  True, False, False])
@@ -153,7 +153,7 @@ def layout_iou_3d(
         ValueError: if a polygon has fewer than three corners, is not finite, or crosses itself;
             if a ceiling is not above its floor.
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
         >>> layout_iou_3d(room, (0.0, 2.0), room, (0.0, 2.5))
         0.8

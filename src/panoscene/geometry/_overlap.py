@@ -25,7 +25,7 @@ def rectangle_intersection_area(a: OrientedBoxes, b: OrientedBoxes) -> Float[Ten
     Convention:
         - broadcasts over the batch axes: all pairs are ``f(boxes[:, None], boxes[None, :])``
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.full((3,), 2.0), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([1.5, 1.0, 9.0]), box.size, box.yaw)
         >>> float(rectangle_intersection_area(box, moved))
@@ -48,7 +48,7 @@ def paired_intersection_volume(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tens
     Convention:
         - broadcasts over the batch axes; see ``box_intersection_volume`` for all pairs of two lists
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.full((3,), 2.0), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([1.5, 1.0, 1.0]), box.size, box.yaw)
         >>> float(paired_intersection_volume(box, moved))
@@ -67,7 +67,7 @@ def paired_box_iou(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*batch"
     Convention:
         - broadcasts over the batch axes; see ``box_iou`` for all pairs of two lists
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.full((3,), 2.0), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([0.0, 0.0, 1.0]), box.size, box.yaw)
         >>> round(float(paired_box_iou(box, moved)), 6)
@@ -81,7 +81,7 @@ def paired_box_iou(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*batch"
 def box_intersection_volume(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "n m"]:
     """Return the volume in cubic metres that each of n boxes shares with each of m boxes.
 
-    Example:
+    Examples:
         >>> boxes = OrientedBoxes(torch.zeros(2, 3), torch.full((2, 3), 2.0), torch.zeros(2))
         >>> box_intersection_volume(boxes, boxes[:1]).tolist()
         [[8.0], [8.0]]
@@ -92,7 +92,7 @@ def box_intersection_volume(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor,
 def box_iou(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "n m"]:
     """Return the exact 3D intersection over union of each of n boxes with each of m boxes.
 
-    Example:
+    Examples:
         >>> boxes = OrientedBoxes(torch.zeros(2, 3), torch.full((2, 3), 2.0), torch.zeros(2))
         >>> box_iou(boxes, boxes[:1]).tolist()
         [[1.0], [1.0]]

@@ -48,7 +48,7 @@ def perspective_crop(
     Raises:
         ValueError: If ``size``, ``max_fov`` or ``mode`` is out of range.
 
-    Example:
+    Examples:
         >>> image = torch.arange(8.0).reshape(1, 1, 8).expand(1, 4, 8)
         >>> ahead_and_right = torch.tensor([[0.0, 0.0, 0.5, 0.5], [torch.pi / 2, 0.0, 0.5, 0.5]])
         >>> perspective_crop(image, ahead_and_right, (1, 1)).flatten()
@@ -71,7 +71,7 @@ def perspective_directions(
     Raises:
         ValueError: If ``size`` or ``max_fov`` is out of range.
 
-    Example:
+    Examples:
         >>> perspective_directions(torch.tensor([0.0, 0.0, 1.0, 1.0]), (3, 3))[1, 1]
         tensor([0., 1., 0.])
     """
@@ -107,7 +107,7 @@ def pixel_in_perspective(
     Raises:
         ValueError: If ``size`` or ``max_fov`` is out of range.
 
-    Example:
+    Examples:
         >>> bfov = torch.tensor([0.0, 0.0, torch.pi / 2, torch.pi / 2])
         >>> pixel_in_perspective(torch.tensor([1.0, 1.0, 0.0]), bfov, (64, 64))
         (tensor([64., 32.]), tensor(True))
@@ -153,7 +153,7 @@ def panorama_from_perspective(
     Raises:
         ValueError: If the panorama is empty, or ``max_fov`` or ``mode`` is out of range.
 
-    Example:
+    Examples:
         >>> ahead = torch.tensor([0.0, 0.0, torch.pi / 2, torch.pi / 2])
         >>> panorama, covered = panorama_from_perspective(torch.ones(3, 32, 32), ahead, 64, 128)
         >>> panorama.shape, int(covered[32].sum())

@@ -25,7 +25,7 @@ def signed_distance_to_polygon(
 
     Source: the point-to-polygon distance of the energy E^c (paper, supplement, wall collision).
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
         >>> signed_distance_to_polygon(torch.tensor([[1.0, 2.5], [7.0, 7.0]]), room)
         tensor([-0.5000,  5.0000])
@@ -91,7 +91,7 @@ def polygon_contains(
 
     Points exactly on the outline may count either way.
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
         >>> polygon_contains(torch.tensor([[1.0, 1.0], [5.0, 1.0]]), room)
         tensor([ True, False])
@@ -102,7 +102,7 @@ def polygon_contains(
 def polygon_area(polygon: Float[Tensor, "*batch corners 2"]) -> Float[Tensor, "*batch"]:
     """Return the signed area in square metres, positive for counter-clockwise corners.
 
-    Example:
+    Examples:
         >>> polygon_area(torch.tensor([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]))
         tensor(12.)
     """
@@ -127,7 +127,7 @@ def box_in_room_fraction(
         - the room is the floor polygon between world z = floor_height and z = ceiling_height
         - padding by repeated corners changes nothing
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
         >>> box = OrientedBoxes(
         ...     torch.tensor([[4.0, 1.0, 0.5]]), torch.ones(1, 3), torch.zeros(1)
@@ -157,7 +157,7 @@ def footprint_area_in_polygon(
     itself, so the area it encloses is the wanted one: the integral of -y dx along it. It is
     piecewise linear between the points where it enters or leaves the two strips.
 
-    Example:
+    Examples:
         >>> room = torch.tensor([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
         >>> boxes = OrientedBoxes(
         ...     torch.tensor([[4.0, 3.0, 0.5]]), torch.ones(1, 3), torch.zeros(1)

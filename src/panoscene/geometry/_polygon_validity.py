@@ -20,7 +20,7 @@ def polygon_problem(polygon: Float[Tensor, "corners 2"]) -> str | None:
     Valid: at least three finite corners, no two alike, no wall crosses or touches another,
     counter-clockwise from above.
 
-    Example:
+    Examples:
         >>> polygon_problem(torch.tensor([[0.0, 0.0], [4.0, 3.0], [4.0, 0.0], [0.0, 3.0]]))
         'walls cross or touch: Self-intersection[2 1.5]'
     """
@@ -60,7 +60,7 @@ def is_manhattan(polygon: Float[Tensor, "corners 2"], tolerance: float = 0.01) -
     The room may be turned: the axes are the length-weighted mean of the walls' own directions,
     and ``tolerance`` is the largest angle in radians that a wall may differ from them.
 
-    Example:
+    Examples:
         >>> is_manhattan(torch.tensor([[2.0, 0.0], [4.0, 2.0], [2.0, 4.0], [0.0, 2.0]]))
         True
     """
@@ -84,7 +84,7 @@ def polygon_intersection_area(
     Raises:
         ValueError: if a polygon has fewer than three corners, is not finite, or crosses itself.
 
-    Example:
+    Examples:
         >>> square = torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
         >>> polygon_intersection_area(square, square + 1)
         1.0
@@ -101,7 +101,7 @@ def polygon_iou(
     Raises:
         ValueError: if a polygon has fewer than three corners, is not finite, or crosses itself.
 
-    Example:
+    Examples:
         >>> square = torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
         >>> round(polygon_iou(square, square + 1), 4)
         0.1429

@@ -35,7 +35,7 @@ def sample_panorama(
     Raises:
         ValueError: If the mode is unknown, or would mix integers, or the image is empty.
 
-    Example:
+    Examples:
         >>> image = torch.tensor([[[0.0, 1.0, 2.0, 3.0], [4.0, 5.0, 6.0, 7.0]]])
         >>> sample_panorama(image, torch.tensor([[[1.5, 0.5], [4.0, 0.5], [0.5, 0.0]]]))
         tensor([[[1.0000, 1.5000, 1.0000]]])
@@ -68,7 +68,7 @@ def rotate_panorama(
     Raises:
         ValueError: If a matrix is not a rotation, or the mode does not suit the image.
 
-    Example:
+    Examples:
         >>> image = torch.arange(8.0).reshape(1, 2, 4)
         >>> clockwise = torch.tensor([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         >>> rotate_panorama(image, clockwise).round()
@@ -101,7 +101,7 @@ def panorama_directions(
     Raises:
         ValueError: If the panorama has no rows or no columns.
 
-    Example:
+    Examples:
         >>> panorama_directions(2, 4, like=torch.zeros(())).shape
         torch.Size([2, 4, 3])
     """

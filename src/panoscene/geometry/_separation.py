@@ -26,7 +26,7 @@ def separation_margins(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*ba
     Convention:
         - order: x of a, y of a, x of b, y of b, z of a, z of b (the last two are equal)
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.full((3,), 2.0), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([1.5, 0.0, 0.0]), box.size, box.yaw)
         >>> separation_margins(box, moved).tolist()
@@ -61,7 +61,7 @@ def separation_weights(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*ba
     is one half of each duplicate at 0 and 90 degrees and one at 45 degrees, where all four
     directions differ. The weight is smooth in t, so nothing jumps as boxes become parallel.
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.3))
         >>> separation_weights(box, box).tolist()
         [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
@@ -81,7 +81,7 @@ def boxes_collide(
           never below 1 cm), so two boxes must overlap by more than it. A negative one grows the
           boxes: they collide when less than that apart
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([0.95, 0.0, 0.0]), box.size, box.yaw)
         >>> bool(boxes_collide(box, moved)), bool(boxes_collide(box, moved, tolerance=0.1))
@@ -103,7 +103,7 @@ def collision_error(
         - ``duplicate_axes`` true is the paper's sum over six axes, false weighs them by
           ``separation_weights``
 
-    Example:
+    Examples:
         >>> big = OrientedBoxes(torch.zeros(3), torch.full((3,), 2.0), torch.tensor(0.0))
         >>> small = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.0))
         >>> float(collision_error(big, small))
@@ -128,7 +128,7 @@ def touch_error(
     Convention:
         - as in ``collision_error``
 
-    Example:
+    Examples:
         >>> big = OrientedBoxes(torch.zeros(3), torch.full((3,), 2.0), torch.tensor(0.0))
         >>> small = OrientedBoxes(torch.tensor([4.0, 0.0, 0.0]), torch.ones(3), torch.tensor(0.0))
         >>> float(touch_error(big, small))
@@ -152,7 +152,7 @@ def penetration_depth(
     Convention:
         - ``tolerance`` as in ``boxes_collide``
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([0.75, 0.5, 0.0]), box.size, box.yaw)
         >>> float(penetration_depth(box, moved))
@@ -165,7 +165,7 @@ def penetration_depth(
 def gap(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "*batch"]:
     """Return the Euclidean distance between two boxes in metres; zero if they touch or overlap.
 
-    Example:
+    Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.0))
         >>> moved = OrientedBoxes(torch.tensor([4.0, 5.0, 0.0]), box.size, box.yaw)
         >>> float(gap(box, moved))

@@ -27,7 +27,7 @@ def lonlat_from_pixel(
     Raises:
         ValueError: If the panorama has no rows or no columns.
 
-    Example:
+    Examples:
         >>> lonlat_from_pixel(torch.tensor([[512.0, 256.0], [0.0, 512.0]]), 512, 1024)
         tensor([[ 0.0000,  0.0000],
                 [-3.1416, -1.5708]])
@@ -55,7 +55,7 @@ def pixel_from_lonlat(
     Raises:
         ValueError: If the panorama has no rows or no columns.
 
-    Example:
+    Examples:
         >>> pixel_from_lonlat(torch.tensor([torch.pi / 2, torch.pi / 4]), 512, 1024)
         tensor([768., 128.])
     """
@@ -69,7 +69,7 @@ def direction_from_lonlat(lonlat: Float[Tensor, "*batch 2"]) -> Float[Tensor, "*
     Convention:
         - (cos lat sin lon, cos lat cos lon, sin lat) in camera axes: +x right, +y ahead, +z up
 
-    Example:
+    Examples:
         >>> direction_from_lonlat(torch.tensor([0.0, 0.0]))
         tensor([0., 1., 0.])
     """
@@ -86,7 +86,7 @@ def lonlat_from_direction(direction: Float[Tensor, "*batch 3"]) -> Float[Tensor,
         - straight up and down have no longitude: 0 is returned there, with a gradient of zero,
           and the zero vector is seen at (0, 0)
 
-    Example:
+    Examples:
         >>> lonlat_from_direction(torch.tensor([2.0, 0.0, 0.0]))
         tensor([1.5708, 0.0000])
     """
@@ -105,7 +105,7 @@ def direction_from_pixel(
     Raises:
         ValueError: If the panorama has no rows or no columns.
 
-    Example:
+    Examples:
         >>> direction_from_pixel(torch.tensor([512.0, 256.0]), 512, 1024)
         tensor([0., 1., 0.])
     """
@@ -123,7 +123,7 @@ def pixel_from_direction(
     Raises:
         ValueError: If the panorama has no rows or no columns.
 
-    Example:
+    Examples:
         >>> pixel_from_direction(torch.tensor([0.0, 3.0, 0.0]), 512, 1024)
         tensor([512., 256.])
     """
@@ -141,7 +141,7 @@ def camera_from_turned(lonlat: Float[Tensor, "*batch 2"]) -> Float[Tensor, "*bat
         - lon turns clockwise seen from above, lat pitches up, both in radians
         - (0, 1, 0) in the turned camera is the direction of ``lonlat`` in the camera
 
-    Example:
+    Examples:
         >>> looking_up = camera_from_turned(torch.tensor([0.0, torch.pi / 6]))
         >>> looking_up @ torch.tensor([0.0, 1.0, 0.0])
         tensor([0.0000, 0.8660, 0.5000])

@@ -34,7 +34,7 @@ def tangent_points(
         - a direction is shown within MAX_TANGENT_FOV / 2 of the point of contact; the others get
           (0, 0) and False
 
-    Example:
+    Examples:
         >>> points, shown = tangent_points(
         ...     torch.tensor([[1.0, 2.0, 0.5], [0.0, -1.0, 0.0]]), torch.tensor([0.0, 0.0])
         ... )
@@ -72,7 +72,7 @@ def tangent_box_from_directions(
     Raises:
         ValueError: If a batch entry has no valid point.
 
-    Example:
+    Examples:
         >>> corners = torch.tensor([[-0.1, 1.0, 0.0], [0.2, 1.0, 0.3]])
         >>> tangent_box_from_directions(corners, torch.tensor([0.0, 0.0]))
         tensor([-0.1000,  0.0000,  0.2000,  0.3000])
@@ -105,7 +105,7 @@ def tangent_box_from_bfov(bfov: Float[Tensor, "*batch 4"]) -> Float[Tensor, "*ba
         - the sides agree with the BFoV everywhere, bottom and top on the centre column only: there
           a BFoV's border curves outwards to y / cos lon'
 
-    Example:
+    Examples:
         >>> tangent_box_from_bfov(torch.tensor([1.0, 0.5, torch.pi / 2, torch.pi]))
         tensor([-1.0000, -3.7321,  1.0000,  3.7321])
     """
@@ -127,7 +127,7 @@ def bfov_from_tangent_box(
     Raises:
         ValueError: If a box is not finite, or its left exceeds its right, or its bottom its top.
 
-    Example:
+    Examples:
         >>> box = torch.tensor([-1.0, -0.5, 1.0, 0.5])
         >>> bfov_from_tangent_box(box, torch.tensor([3.0, 0.2]))
         tensor([3.0000, 0.2000, 1.5708, 0.9273])

@@ -47,7 +47,7 @@ def column_sums(
         nearness: Inverse horizontal distance to the wall in 1 / metres.
         weight: Inverse variance of the nearness.
 
-    Example:
+    Examples:
         >>> column_sums(torch.eye(2), torch.ones(2), torch.ones(2))[5]
         tensor([0., 1., 2.])
     """
@@ -59,7 +59,7 @@ def column_sums(
 def run_of(sums: Float[Tensor, "6 columns_and_1"], first: int, end: int) -> Run:
     """Return the run of columns from ``first`` up to ``end``.
 
-    Example:
+    Examples:
         >>> sums = column_sums(torch.eye(2), torch.ones(2), torch.ones(2))
         >>> run_of(sums, 1, 2).energy
         1.0
@@ -121,7 +121,7 @@ def cheapest_path(
 
     Each run pays its cost and the toll of the node at which it ends.
 
-    Example:
+    Examples:
         >>> cost = torch.tensor([[9.0, 1.0, 5.0], [9.0, 9.0, 1.0], [9.0, 9.0, 9.0]])
         >>> cheapest_path(cost, torch.tensor([0.0, 1.0, 0.0]))
         [(0, 1), (1, 2)]

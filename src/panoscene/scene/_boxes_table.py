@@ -115,7 +115,7 @@ def objects_from_boxes(
     Raises:
         ValueError: A category is unknown, or there is not one for each box.
 
-    Example:
+    Examples:
         >>> bed = OrientedBoxes(
         ...     torch.tensor([[0.0, 2.0, 0.3]]), torch.tensor([[1.6, 2.0, 0.6]]), torch.zeros(1)
         ... )

@@ -192,7 +192,7 @@ def category_index(name: str) -> int:
     Raises:
         ValueError: The name is not one of the 57; the message suggests the closest ones.
 
-    Example:
+    Examples:
         >>> category_index("bed")
         2
     """
@@ -205,7 +205,7 @@ def category_index(name: str) -> int:
 def category_suggestion(name: str) -> str:
     """Return a phrase that tells what may have been meant by an unknown category name.
 
-    Example:
+    Examples:
         >>> category_suggestion("television")
         "did you mean 'standing_tv'?"
     """

@@ -39,7 +39,7 @@ _FIELDS = sorted(
 def json_path(parts: tuple[int | str, ...]) -> str:
     """Return a place in a JSON document in the usual notation.
 
-    Example:
+    Examples:
         >>> json_path(("objects", 3, "box"))
         '$.objects[3].box'
     """

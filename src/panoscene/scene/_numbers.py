@@ -14,7 +14,7 @@ def numbers_from_tensor(tensor: Shaped[Tensor, "..."]) -> Any:
     A float32 becomes the shortest decimal that is nearest to it, so that files say 0.1 and not
     0.10000000149011612.
 
-    Example:
+    Examples:
         >>> numbers_from_tensor(torch.tensor([0.1, 2.0]))
         [0.1, 2.0]
     """

@@ -69,7 +69,7 @@ def relations_from_boxes(
 
     Source: paper, Sec. 3.2 (relation estimation); tolerances of the labels in the release.
 
-    Example:
+    Examples:
         >>> room = Layout(torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]))
         >>> bed = OrientedBoxes(
         ...     torch.tensor([[0.0, 1.0, 0.3]]), torch.tensor([[1.6, 2.0, 0.6]]), torch.zeros(1)
@@ -119,7 +119,7 @@ def relations_from_boxes(
 def relative_yaw_bins(angle: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 8"]:
     """Return the one-hot bin whose centre is nearest to each angle in radians, on the circle.
 
-    Example:
+    Examples:
         >>> relative_yaw_bins(torch.tensor([0.1, 3.1])).argmax(-1).tolist()
         [4, 0]
     """
@@ -130,7 +130,7 @@ def relative_yaw_bins(angle: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 8
 def relative_yaw_angle(probability: Float[Tensor, "*batch 8"]) -> Float[Tensor, "*batch"]:
     """Return the centre in radians of the most probable bin, in [-pi, pi).
 
-    Example:
+    Examples:
         >>> relative_yaw_angle(torch.eye(8)[[0, 4, 6]])
         tensor([-3.1416,  0.0000,  1.5708])
     """

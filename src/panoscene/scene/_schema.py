@@ -209,7 +209,7 @@ def scene_json_schema() -> dict[str, Any]:
     What a schema cannot say (unique ids, a simple counter-clockwise polygon, relations that name
     existing objects) is checked by ``read_scene`` on top.
 
-    Example:
+    Examples:
         >>> scene_json_schema()["title"]
         'panoscene scene'
     """

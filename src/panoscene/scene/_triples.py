@@ -58,7 +58,7 @@ def object_names(objects: Objects) -> tuple[str, ...]:
 def wall_names(count: int) -> tuple[str, ...]:
     """Return the names of the walls in the order of the floor polygon.
 
-    Example:
+    Examples:
         >>> wall_names(2)
         ('wall-0', 'wall-1')
     """

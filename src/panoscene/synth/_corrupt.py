@@ -48,7 +48,7 @@ def corrupt_relations(
     Raises:
         ValueError: if one of the numbers is out of its range.
 
-    Example:
+    Examples:
         >>> from panoscene.synth import sample_room
         >>> room = sample_room(np.random.default_rng(0), objects=4)
         >>> soft = corrupt_relations(room.relations, np.random.default_rng(1), flip=0.0)

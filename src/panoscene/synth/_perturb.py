@@ -81,7 +81,7 @@ def perturb_scene(
         rng: source of randomness; always the same number of draws for the same shapes.
         noise: how wrong; the defaults of ``PerturbNoise`` when omitted.
 
-    Example:
+    Examples:
         >>> from panoscene.synth import sample_room
         >>> room = sample_room(np.random.default_rng(0), objects=3)
         >>> same = perturb_scene(

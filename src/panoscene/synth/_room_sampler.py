@@ -43,7 +43,7 @@ def sample_room(
         ValueError: if ``objects`` is negative, ``corners`` is not one of these numbers or the
             camera is not between 0.3 and 2.2 m above the floor.
 
-    Example:
+    Examples:
         >>> room = sample_room(np.random.default_rng(0), objects=5, corners=6)
         >>> len(room.objects.boxes), len(room.layout.floor_polygon)
         (5, 6)

@@ -97,7 +97,7 @@ def run_demo(output: Path, seed: int = 0) -> DemoResult:
 def describe_violations(violations: Violations) -> str:
     """Return collisions and what is outside the room in words, for captions.
 
-    Example:
+    Examples:
         >>> from panoscene.arrange import Violations
         >>> describe_violations(Violations(0.0, {}, 2, 0.123, 0.2, 0.05, 0.314))
         '2 pairs collide · worst overlap 12 cm · 0.31 m³ outside the room'

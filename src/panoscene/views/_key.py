@@ -106,7 +106,7 @@ def longest_key(categories: Sequence[int]) -> float:
 def number_ranges(numbers: set[int]) -> str:
     """Return numbers in words, runs of them as ranges.
 
-    Example:
+    Examples:
         >>> number_ranges({1, 2, 3, 5})
         '1-3, 5'
     """

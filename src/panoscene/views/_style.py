@@ -88,7 +88,7 @@ _GROUP = {category: group for group, members in GROUPS.items() for category in m
 def group_of(category: str) -> str:
     """Return the group whose colour a category wears.
 
-    Example:
+    Examples:
         >>> group_of("sofa")
         'seating'
     """
@@ -98,7 +98,7 @@ def group_of(category: str) -> str:
 def words(category: str) -> str:
     """Return a category as it is written in pictures.
 
-    Example:
+    Examples:
         >>> words("coffee_table")
         'coffee table'
     """
