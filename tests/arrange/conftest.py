@@ -40,7 +40,11 @@ def random_batch(
         ],
         -1,
     )
-    touching = rand(scenes, n, n)
+    centre[:, 0, 2] = 2.2  # one box through the ceiling, one far below the floor, one far above
+    centre[:, 1, 2] = -1.5
+    centre[:, 2, 2] = 4.5
+    centre[:, -1] = centre[:, -2] + 0.2  # and two that collide
+    touching = 0.5 + 0.5 * rand(scenes, n, n)
 
     def each(values: torch.Tensor) -> torch.Tensor:
         return values.expand(scenes, *values.shape).contiguous()
@@ -53,10 +57,10 @@ def random_batch(
         distance_score=rand(scenes, n),
         yaw_score=rand(scenes, n),
         touching=(touching + touching.transpose(-1, -2)) / 2,
-        touching_wall=rand(scenes, n, m),
+        touching_wall=0.2 + 0.8 * rand(scenes, n, m),
         on_floor=rand(scenes, n),
         under_ceiling=rand(scenes, n),
-        inside_room=rand(scenes, n),
+        inside_room=1 - 0.04 * rand(scenes, n),
         farther_than=rand(scenes, n, n),
         relative_yaw=torch.softmax(rand(scenes, n, n, 8) * 6, -1),
         relative_yaw_wall=torch.softmax(rand(scenes, n, m, 8) * 6, -1),

@@ -32,7 +32,7 @@ def test_object_collision_of_the_fact_sheet():
 
 
 def test_object_collision_without_duplicates_and_as_depth():
-    assert terms.object_collision(CUBES, duplicate_axes=False)[0, 1].item() == pytest.approx(4.5)
+    assert terms.object_collision(CUBES, axis_weight=0.5)[0, 1].item() == pytest.approx(4.5)
     assert terms.object_collision(CUBES, kind="depth")[0, 1].item() == pytest.approx(1.5)
 
 
@@ -47,7 +47,7 @@ def test_touching_of_the_fact_sheet():
     error = terms.touching(CUBES, CUBES)
     assert error[0, 2].item() == pytest.approx(5.0)
     assert error[0, 1].item() == 0
-    assert terms.touching(CUBES, CUBES, duplicate_axes=False)[0, 2].item() == pytest.approx(2.5)
+    assert terms.touching(CUBES, CUBES, axis_weight=0.5)[0, 2].item() == pytest.approx(2.5)
 
 
 def test_wall_collision_is_the_distance_of_corners_outside():
@@ -117,7 +117,7 @@ TERMS: dict[str, Callable[[OrientedBoxes], Tensor]] = {
         b, BATCH.ceiling_height, lower=True
     ),
     "touching": lambda b: terms.touching(b, b),
-    "touching walls": lambda b: terms.touching(b, BATCH.walls, duplicate_axes=False),
+    "touching walls": lambda b: terms.touching(b, BATCH.walls, axis_weight=0.5),
     "relative_yaw": lambda b: terms.relative_yaw(b, b, BATCH.touching),
     "on_floor": lambda b: terms.on_floor(b, BATCH.floor_height),
     "under_ceiling": lambda b: terms.under_ceiling(b, BATCH.ceiling_height),

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -49,11 +50,14 @@ def arrange(
     Args:
         scene: boxes, layout and relations; relations that are missing are derived from the boxes.
         settings: a preset's name or your own settings.
-        frames: number of intermediate states to keep in ``path``.
+        frames: number of states of the descent to keep in ``path``, from start to end; at most one
+            more than the settings have steps. With ``safe`` the path of a scene whose solution was
+            not acceptable still shows that solution.
 
     Raises:
         ValueError: boxes that cannot be arranged (NaN, infinite, sizes not positive), or an
-            unknown preset.
+            unknown preset. Anything else in a scene that is not finite, of the wrong shape or out
+            of range is refused too; the message names scene and field.
 
     Source: DeepPanoContext, Sec. 3.3 "Relation optimization".
     """
@@ -80,7 +84,7 @@ def arrange_scenes(
         finite = torch.isfinite(final).all(0).all(-1)
         final = torch.where(finite[None, :, None], final, problem.start)
         solved = _settle(final, problem) if settings.safe else final
-        before, between, after = _measure_all([problem.start, kept[late], solved], problem)
+        before, between, after = _measure_all([kept[late], solved], problem)
         chosen = _choose(problem, _Solved(final, solved, finite, after), kept, before)
         path = [boxes_from_variables(kept[mark], problem) for mark in sorted(marks)]
     energies = torch.stack([m.energy.sum(-1) for m in (before, between, after)])
@@ -99,7 +103,7 @@ def arrange_scenes(
         )
         results.append(
             Arrangement(
-                scene=replace(scene, objects=replace(scene.objects, boxes=boxes)),
+                scene=replace(scene, objects=replace(scene.objects, boxes=_like(boxes, scene))),
                 certificate=certificate,
                 path=tuple(frame[index, :count] for frame in path),
             )
@@ -172,8 +176,16 @@ def _for_device(problem: Problem) -> tuple[Kernel, Any]:
 def _descend(problem: Problem, keep: set[int]) -> tuple[Tensor, dict[int, Tensor]]:
     """Run the solver with the array library that suits the device."""
     kernel, start = _for_device(problem)
-    final, kept = descend(start, kernel, problem.settings, keep)
+    # what overflows is not finite and will not be taken
+    with np.errstate(all="ignore"):
+        final, kept = descend(start, kernel, problem.settings, keep)
     return torch.as_tensor(final), {step: torch.as_tensor(x) for step, x in kept.items()}
+
+
+def _like(boxes: OrientedBoxes, scene: Scene) -> OrientedBoxes:
+    """Return the boxes in the scene's own precision; a batch has the finest of its scenes."""
+    dtype = scene.objects.boxes.centre.dtype
+    return OrientedBoxes(boxes.centre.to(dtype), boxes.size.to(dtype), boxes.yaw.to(dtype))
 
 
 def _measure(variables: Tensor, problem: Problem) -> Measures:
@@ -182,9 +194,18 @@ def _measure(variables: Tensor, problem: Problem) -> Measures:
 
 
 def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
-    """Return the measures of several states of the same scenes."""
-    together = _measure(torch.cat(states, 1), repeat_problem(problem, len(states)))
-    return together.split(len(states))
+    """Return the measures of the input and of other states, in one go."""
+    together = repeat_problem(problem, 1 + len(states))
+    variables = torch.cat([problem.start, *states], 1)
+    decoded = boxes_from_variables(variables, together)
+    given, count = problem.batch.boxes, len(problem.batch.boxes)
+    boxes = OrientedBoxes(
+        torch.cat([given.centre, decoded.centre[count:]]),
+        torch.cat([given.size, decoded.size[count:]]),
+        torch.cat([given.yaw, decoded.yaw[count:]]),
+    )
+    energies = energy_terms(variables, together, boxes)
+    return measure(boxes, together.batch, energies).split(1 + len(states))
 
 
 @dataclass(frozen=True, slots=True)

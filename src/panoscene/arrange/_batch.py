@@ -1,5 +1,6 @@
 """Scenes as one padded batch: what the energy is a function of, and what it is not."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn.utils.rnn import pad_sequence
 
+from panoscene.arrange._checks import check_scene
 from panoscene.geometry import OrientedBoxes, wall_boxes
 from panoscene.scene import Scene, relations_from_boxes
 
@@ -64,13 +66,14 @@ def collate_scenes(scenes: Sequence[Scene]) -> ArrangementBatch:
     belongs in the room if any of its lower corners is inside, since the boxes may be off.
 
     Raises:
-        ValueError: no scenes, or a scene whose boxes cannot be arranged (NaN, infinite, or
-            sizes that are not positive); the message names scene, object and field.
+        ValueError: no scenes, or one with something that cannot be arranged: a number that is not
+            finite, a size that is not positive, a score outside [0, 1], relations of the wrong
+            shape, an invalid floor polygon; the message names scene and field.
     """
     if not scenes:
         raise ValueError("scenes: found none, expected at least one")
     for number, scene in enumerate(scenes):
-        _check_scene(scene, number)
+        check_scene(scene, number)
     relations = [
         scene.relations
         if scene.relations is not None
@@ -81,7 +84,9 @@ def collate_scenes(scenes: Sequence[Scene]) -> ArrangementBatch:
     ]
     count = max(len(scene.objects.boxes) for scene in scenes)
     corners = max(scene.layout.floor_polygon.shape[0] for scene in scenes)
-    dtype = scenes[0].objects.boxes.centre.dtype
+    dtype = functools.reduce(
+        torch.promote_types, [scene.objects.boxes.centre.dtype for scene in scenes]
+    )
     device = scenes[0].objects.boxes.centre.device
 
     def objects(parts: Sequence[Tensor], fill: float = 0.0) -> Tensor:
@@ -141,25 +146,3 @@ def collate_scenes(scenes: Sequence[Scene]) -> ArrangementBatch:
         ceiling_height=heights([s.layout.ceiling_height for s in scenes]),
         camera_height=heights([s.panorama.camera_height for s in scenes]),
     )
-
-
-def _check_scene(scene: Scene, number: int) -> None:
-    """Refuse what no energy is defined for."""
-    boxes = scene.objects.boxes
-    label = f"scene {number}" + (f" ({scene.name})" if scene.name else "")
-    for field, values in (("centre", boxes.centre), ("size", boxes.size), ("yaw", boxes.yaw)):
-        bad = ~torch.isfinite(values)
-        bad = bad.any(-1) if bad.ndim > 1 else bad
-        if bool(bad.any()):
-            first = int(bad.nonzero()[0, 0])
-            raise ValueError(
-                f"{label}, object {first}, {field}: found {values[first].tolist()}, "
-                "expected finite numbers"
-            )
-    flat = (boxes.size <= 0).any(-1)
-    if bool(flat.any()):
-        first = int(flat.nonzero()[0, 0])
-        raise ValueError(
-            f"{label}, object {first}, size: found {boxes.size[first].tolist()}, "
-            "expected width, depth and height above 0"
-        )

@@ -11,15 +11,16 @@ from panoscene.geometry import OrientedBoxes
 
 
 def energy_terms(
-    variables: Float[Tensor, "7 scenes n"], problem: Problem
+    variables: Float[Tensor, "7 scenes n"], problem: Problem, boxes: OrientedBoxes | None = None
 ) -> Float[Tensor, "scenes terms"]:
     """Return every weighted term of every scene, in the order of ``TERM_NAMES``.
 
     Entries are multiplied by their confidence, then Huber errors (``loss_beta``) are summed or
     averaged, then multiplied by the term's weight. Differentiable; the sum over the last axis is
-    the energy of the paper (Sec. 3.3).
+    the energy of the paper (Sec. 3.3). ``boxes`` spares decoding the variables, or are the boxes
+    that the variables were encoded from.
     """
-    boxes = boxes_from_variables(variables, problem)
+    boxes = boxes_from_variables(variables, problem) if boxes is None else boxes
     errors = {
         **_collision_errors(boxes, problem),
         **_relation_errors(boxes, variables[2], problem),
@@ -42,7 +43,7 @@ def _collision_errors(boxes: OrientedBoxes, problem: Problem) -> dict[str, Tenso
     pair = terms.object_collision(
         boxes,
         clearance=settings.clearance,
-        duplicate_axes=settings.duplicate_axes,
+        axis_weight=settings.axis_weight,
         kind=settings.collision,
     )
     wall = terms.wall_collision(boxes, batch.polygon, clearance=settings.clearance)
@@ -64,14 +65,14 @@ def _collision_errors(boxes: OrientedBoxes, problem: Problem) -> dict[str, Tenso
 
 def _relation_errors(boxes: OrientedBoxes, distance: Tensor, problem: Problem) -> dict[str, Tensor]:
     batch, conf = problem.batch, problem.confidence
-    twice, apart = problem.settings.duplicate_axes, problem.settings.clearance
+    share, apart = problem.settings.axis_weight, problem.settings.clearance
     return {
         "relative_yaw": terms.relative_yaw(boxes, boxes, problem.yaw_target) * conf.relative_yaw,
         "relative_yaw_wall": terms.relative_yaw(boxes, batch.walls, problem.yaw_target_wall)
         * conf.relative_yaw_wall,
-        "touching": terms.touching(boxes, boxes, duplicate_axes=twice, clearance=apart)
+        "touching": terms.touching(boxes, boxes, axis_weight=share, clearance=apart)
         * conf.touching,
-        "touching_wall": terms.touching(boxes, batch.walls, duplicate_axes=twice, clearance=apart)
+        "touching_wall": terms.touching(boxes, batch.walls, axis_weight=share, clearance=apart)
         * conf.touching_wall,
         "on_floor": terms.on_floor(boxes, batch.floor_height, clearance=apart) * conf.on_floor,
         "under_ceiling": terms.under_ceiling(boxes, batch.ceiling_height, clearance=apart)

@@ -86,7 +86,7 @@ def energy_gradient(x: Array, k: Kernel) -> Array:
         ]
     )
     # a size is twice the half, and stands still at its floor
-    out = out * k.halved * (x > k.lowest)
+    out = out * k.halved * (x >= k.lowest)
     away = (x - k.start) * k.observation_slope
     return out + xp.maximum(xp.minimum(away, k.one), -k.one) * k.observation_gain
 

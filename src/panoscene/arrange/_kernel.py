@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from panoscene.arrange._problem import SMALLEST_SIZE, Problem
+from panoscene.arrange._problem import Problem
 
 _CORNER_X = (-1.0, 1.0, 1.0, -1.0)
 _CORNER_Y = (-1.0, -1.0, 1.0, 1.0)
@@ -192,7 +192,6 @@ def make_kernel(problem: Problem) -> Kernel:
         ]
     )
     lon, lat, wide, tall = batch.bfov.unbind(-1)
-    duplicate = 1.0 if settings.duplicate_axes else 0.5
     bits = torch.arange(8, device=one.device)
     table = torch.tensor([_CORNER_X, _CORNER_Y], dtype=one.dtype, device=one.device)
     side_x, side_y = table[0][bits % 4], table[1][bits % 4]
@@ -213,7 +212,7 @@ def make_kernel(problem: Problem) -> Kernel:
         turning=1.0 if problem.view_relative else 0.0,
         wall_planes=torch.stack([torch.complex(*walls.centre.unbind(-1)[:2]), right]),
         wall_rows=torch.stack([walls.centre[..., 2], *wall_half, walls.yaw]),
-        axis_weight=duplicate * one.new_tensor([1, 1, 1, 1, 2]).view(5, 1, 1, 1),
+        axis_weight=settings.axis_weight * one.new_tensor([1, 1, 1, 1, 2]).view(5, 1, 1, 1),
         clearance=settings.clearance,
         depth=settings.collision == "depth",
         collision_slope=1 / beta,
@@ -257,7 +256,7 @@ def make_kernel(problem: Problem) -> Kernel:
         plane_side=torch.complex(side_x, side_y),
         up_side=torch.where(bits < 4, -one, one),
         halved=one.new_tensor([1, 1, 1, 1, 0.5, 0.5, 0.5]).view(7, 1, 1),
-        lowest=one.new_tensor([-math.inf] * 4 + [SMALLEST_SIZE] * 3).view(7, 1, 1),
+        lowest=torch.cat([torch.full_like(problem.start[:4], -math.inf), problem.smallest]),
         wall_base=(count * m).view(scenes, n, 4),
         wall_side=torch.complex(side_x, side_y)[:4].expand(scenes, n, 4),
         corner_base=(count[: scenes * n] * 8).view(scenes, n, 1),
@@ -265,5 +264,5 @@ def make_kernel(problem: Problem) -> Kernel:
         low_high=one.new_tensor([-1, 1]),
         zero=one * 0,
         one=one,
-        smallest=one * SMALLEST_SIZE,
+        smallest=problem.smallest,
     )

@@ -13,7 +13,7 @@ from panoscene.arrange._settings import TERM_NAMES, ArrangementSettings
 from panoscene.geometry import OrientedBoxes, wrap_angle
 
 SMALLEST_SIZE = 0.01
-"""Metres; sizes below act as this in every term, as in the authors' release."""
+"""Metres below which no size may shrink; a box that is thinner keeps at least what it has."""
 SMALLEST_BETA = 1e-9
 """Stands for the plain absolute error."""
 PIXEL_WIDTH = 1024
@@ -60,6 +60,8 @@ class Problem:
     """Radians of lon and lat for one unit of the direction variables."""
     direction_origin: Float[Tensor, "2 scenes n"]
     """Lon and lat at zero direction variables."""
+    smallest: Float[Tensor, "3 scenes n"]
+    """Metres below which the sizes act as this."""
 
     @property
     def view_relative(self) -> bool:
@@ -92,6 +94,7 @@ def make_problem(
         start=start,
         direction_scale=scale,
         direction_origin=origin,
+        smallest=start[4:].clamp(max=SMALLEST_SIZE),
     )
 
 
@@ -103,7 +106,7 @@ def boxes_from_variables(variables: Float[Tensor, "7 scenes n"], problem: Proble
     height = problem.batch.camera_height[:, None] + distance * torch.sin(lat)
     centre = torch.stack([horizontal * torch.sin(lon), horizontal * torch.cos(lon), height], -1)
     yaw = -variables[3] - lon if problem.view_relative else -variables[3]
-    size = variables[4:].clamp(min=SMALLEST_SIZE).movedim(0, -1)
+    size = torch.maximum(variables[4:], problem.smallest).movedim(0, -1)
     return OrientedBoxes(centre, size, wrap_angle(yaw))
 
 
@@ -216,7 +219,7 @@ def _yaw_target(
     angle = bins * (math.pi / 4) - math.pi
     if settings.relative_yaw_target == "argmax":
         return angle[probability.argmax(-1)]
-    return torch.atan2(probability @ torch.sin(angle), probability @ torch.cos(angle) + 1e-12)
+    return torch.atan2(probability @ torch.sin(angle), probability @ torch.cos(angle) + 1e-3)
 
 
 def _term_scales(
@@ -268,4 +271,5 @@ def repeat_problem(problem: Problem, times: int) -> Problem:
         start=problem.start.repeat(1, times, 1),
         direction_scale=problem.direction_scale.repeat(1, times, 1),
         direction_origin=problem.direction_origin.repeat(1, times, 1),
+        smallest=problem.smallest.repeat(1, times, 1),
     )

@@ -1,6 +1,6 @@
 """Settings of the arrangement optimiser and its three presets."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import torch
 from jaxtyping import Float
@@ -12,43 +12,47 @@ class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
 class TermWeights(_Frozen):
     """The weight (lambda) of every energy term; symbols of the paper in brackets.
 
     Source: the paper's supplement, table of relation-optimisation weights.
     """
 
-    object_collision: float = 1.0
+    object_collision: NonNegative = 1.0
     """[oc] overlap of two objects."""
-    wall_collision: float = 1.0
+    wall_collision: NonNegative = 1.0
     """[wc] box corners outside the floor polygon."""
-    floor_collision: float = 1.0
+    floor_collision: NonNegative = 1.0
     """[fc] boxes below the floor."""
-    ceiling_collision: float = 1.0
+    ceiling_collision: NonNegative = 1.0
     """[cc] boxes above the ceiling."""
-    relative_yaw: float = 0.1
+    relative_yaw: NonNegative = 0.1
     """[rr] between objects."""
-    relative_yaw_wall: float = 0.1
+    relative_yaw_wall: NonNegative = 0.1
     """[rr] between an object and a wall."""
-    touching: float = 1.0
+    touching: NonNegative = 1.0
     """[oa] between objects."""
-    touching_wall: float = 1.0
+    touching_wall: NonNegative = 1.0
     """[oa] between an object and a wall."""
-    on_floor: float = 1.0
+    on_floor: NonNegative = 1.0
     """[fa] gap between an object and the floor."""
-    under_ceiling: float = 1.0
+    under_ceiling: NonNegative = 1.0
     """[ca] gap between an object and the ceiling."""
-    farther_than: float = 0.01
+    farther_than: NonNegative = 0.01
     """[rd] wrong order of distances from the camera."""
-    direction: float = 0.0001
+    direction: NonNegative = 0.0001
     """[delta] the projected centre leaves where it was seen."""
-    distance: float = 0.01
+    distance: NonNegative = 0.01
     """[d] the distance leaves its estimate."""
-    size: float = 1.0
+    size: NonNegative = 1.0
     """[s] the size leaves its estimate."""
-    yaw: float = 0.001
+    yaw: NonNegative = 0.001
     """[theta] the yaw leaves its estimate."""
-    reprojection: float = 10.0
+    reprojection: NonNegative = 10.0
     """[bp] the projected box leaves the BFoV."""
 
     def tensor(
@@ -106,13 +110,14 @@ class ArrangementSettings(_Frozen):
     """Whether distance, size and yaw are held by their confidence above the threshold."""
     reduction: Literal["sum", "mean"] = "sum"
     """Sum of all entries of a term, or their mean (zeros included)."""
-    loss_beta: float = Field(default=0.0, ge=0)
+    loss_beta: NonNegative = 0.0
     """Errors below this are squared (Huber, 'SmoothL1'); 0 is the plain absolute error."""
     collision: Literal["sum", "depth"] = "sum"
     """Object-object collision: overlap summed over the separating axes (paper), or the
     smallest one, which is how far the boxes must really move."""
-    duplicate_axes: bool = True
-    """Count parallel axes twice, as the paper's sum over six axes does."""
+    axis_weight: Positive = 1.0
+    """Weight of each of the six separating axes in a sum over them: 1 as in the paper, or 1/2, so
+    that the axes of parallel boxes, which come in pairs, count once."""
     projection: Literal["edges", "iou"] = "edges"
     """Reprojection error: difference of the four edges in radians, or 1 - IoU."""
     variables: Literal["delta", "pixel", "metric"] = "metric"
@@ -120,14 +125,14 @@ class ArrangementSettings(_Frozen):
     (release), or metres across the line of sight with the yaw in the world frame."""
     relative_yaw_target: Literal["argmax", "mean"] = "argmax"
     """The angle of the most probable bin (stop-gradient), or the circular mean of all bins."""
-    clearance: float = Field(default=0.0, ge=0)
+    clearance: NonNegative = 0.0
     """Metres: objects are held this far apart and half as far from walls, floor and ceiling, and
     contact relations are content with this gap, so that contact never ends in penetration."""
     solver: Literal["sgd", "adam"] = "adam"
     steps: int = Field(default=100, ge=0)
-    learning_rate: float = Field(default=1.0, gt=0)
+    learning_rate: Positive = 1.0
     momentum: float = Field(default=0.9, ge=0, lt=1)
-    direction_gradient_scale: float = Field(default=1.0, gt=0)
+    direction_gradient_scale: Positive = 1.0
     """Factor on the gradient of the direction variable (the release: 1000)."""
     safe: bool = False
     """Keep the input rather than anything worse in energy, collisions or out-of-room volume."""
@@ -153,7 +158,7 @@ _PAPER = ArrangementSettings(
     reduction="sum",
     loss_beta=0.0,
     collision="sum",
-    duplicate_axes=True,
+    axis_weight=1.0,
     projection="iou",
     variables="delta",
     solver="sgd",
@@ -177,7 +182,7 @@ _RELEASED = ArrangementSettings(
     reduction="mean",
     loss_beta=1.0,
     collision="sum",
-    duplicate_axes=True,
+    axis_weight=1.0,
     projection="edges",
     variables="pixel",
     solver="sgd",
@@ -209,11 +214,11 @@ _DEFAULT = ArrangementSettings(
         reprojection=2.1,
     ),
     thresholds=Thresholds(
-        touching=0.7, on_floor=0.3, farther_than=0.1, relative_yaw=0.1, observation=0.1
+        touching=0.7, on_floor=0.3, farther_than=0.1, relative_yaw=0.2, observation=0.1
     ),
     loss_beta=0.01,
     collision="depth",
-    duplicate_axes=False,
+    axis_weight=0.5,
     projection="edges",
     variables="metric",
     clearance=0.004,

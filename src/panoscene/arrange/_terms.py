@@ -36,7 +36,7 @@ def object_collision(
     boxes: OrientedBoxes,
     *,
     clearance: float = 0.0,
-    duplicate_axes: bool = True,
+    axis_weight: float = 1.0,
     kind: Literal["sum", "depth"] = "sum",
 ) -> Float[Tensor, "*batch n n"]:
     """Return the overlap of every ordered pair in metres, 0 when apart [oc, Eq. of e^oc].
@@ -44,14 +44,14 @@ def object_collision(
     Args:
         boxes: world frame, batch shape "*batch n". The diagonal of the result is 0.
         clearance: boxes nearer than this already collide, in metres.
-        duplicate_axes: count parallel axes twice, as the paper does.
+        axis_weight: of each of the six axes; 1/2 counts those of parallel boxes once.
         kind: sum over the separating axes (paper), or the smallest overlap: the distance that
             the pair must really move apart.
     """
     margin = _pair_margins(boxes, boxes) + clearance
     least = margin.amin(-1)
     colliding = (least > 0) & ~torch.eye(boxes.yaw.shape[-1], dtype=torch.bool, device=least.device)
-    overlap = least if kind == "depth" else margin.sum(-1) * (1.0 if duplicate_axes else 0.5)
+    overlap = least if kind == "depth" else margin.sum(-1) * axis_weight
     return torch.where(colliding, overlap, 0.0)
 
 
@@ -104,7 +104,7 @@ def touching(
     boxes: OrientedBoxes,
     others: OrientedBoxes,
     *,
-    duplicate_axes: bool = True,
+    axis_weight: float = 1.0,
     clearance: float = 0.0,
 ) -> Float[Tensor, "*batch n m"]:
     """Return the gap summed over the axes without overlap, in metres [oa].
@@ -113,7 +113,7 @@ def touching(
     up to the clearance is contact.
     """
     gap = torch.relu(-_pair_margins(boxes, others) - clearance).sum(-1)
-    return gap if duplicate_axes else gap * 0.5
+    return gap * axis_weight
 
 
 def relative_yaw(

@@ -31,14 +31,15 @@ Progress = Callable[[str], None] | None
 def run_arrange_benchmark(*, repeats: int = 5, progress: Progress = None) -> dict[str, object]:
     """Return wall-clock medians of the optimiser on perturbed rooms with eight walls.
 
-    Every time is that of the whole call: padding, 100 steps, certificate. Keys:
+    Every time but those to quality is that of the whole call: padding, 100 steps, certificate. Keys:
 
     - ``scene_20_ms``: one scene of 20 objects with ``default``; every preset's time is in
       ``scene_20_presets_ms``;
     - ``batch_64_scenes_s``: 64 such scenes at once, and ``batch_64_presets_s`` likewise;
     - ``scene_200_s``: one scene of 200 objects; ``growth_s`` the way there;
     - ``to_quality_20_ms``: time until ``default`` has a lower energy than ``released`` after its
-      100 steps, from the same start, median over scenes; ``to_quality_reached`` is the share of
+      100 steps, from the same start: padding, preparing and steps up to the first such state,
+      without certificate; median over scenes, infinite where it never does; ``to_quality_reached`` is the share of
       scenes in which it gets there. The judge is the energy of the paper (plain sums, the paper's
       weights), which neither of the two minimises to the letter. ``to_quality_released_20_ms``
       and ``.._reached`` are judged by the released energy, the rival's own;
@@ -141,11 +142,7 @@ def _time_to_quality(
                 reached = step
                 break
         times.append(float("inf") if reached is None else _reach(scene, ours, reached, repeats))
-    finite = [t for t in times if np.isfinite(t)]
-    return (
-        1e3 * statistics.median(finite) if finite else float("nan"),
-        len(finite) / len(times),
-    )
+    return 1e3 * statistics.median(times), float(np.isfinite(times).mean())
 
 
 def _reach(scene: Scene, settings: ArrangementSettings, steps: int, repeats: int) -> float:

@@ -51,7 +51,7 @@ def boxes_from_corners(corners: Float[Tensor, "*batch 8 3"]) -> OrientedBoxes:
     """Return the upright boxes that have these corners: the inverse of ``box_corners``.
 
     Corners that are not exactly those of an upright box give the box with their mean centre,
-    mean edge lengths and mean heading.
+    mean edge lengths and mean yaw.
 
     Examples:
         >>> box = OrientedBoxes(torch.zeros(3), torch.ones(3), torch.tensor(0.5))
@@ -61,7 +61,7 @@ def boxes_from_corners(corners: Float[Tensor, "*batch 8 3"]) -> OrientedBoxes:
     x_edge = (corners[..., 1::2, :] - corners[..., 0::2, :]).mean(dim=-2)
     y_edge = (corners[..., [2, 3, 6, 7], :] - corners[..., [0, 1, 4, 5], :]).mean(dim=-2)
     z_edge = (corners[..., 4:, :] - corners[..., :4, :]).mean(dim=-2)
-    # both horizontal edges vote for the heading, so a box without width still has one
+    # both horizontal edges vote for the yaw, so a box without width still has one
     right_x = x_edge[..., 0] + y_edge[..., 1]
     right_y = x_edge[..., 1] - y_edge[..., 0]
     squared = torch.stack([x_edge, y_edge, z_edge], dim=-2).square().sum(dim=-1)

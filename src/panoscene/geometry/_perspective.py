@@ -13,6 +13,7 @@ from panoscene.geometry._sphere import camera_from_turned, pixel_from_direction
 MAX_FOV = math.radians(150)
 """The widest field of view of a perspective crop in radians, unless the caller says otherwise."""
 
+_WIDEST_FOV = 3.12
 _MIN_FOV = 1e-4
 _MIN_FORWARD = 1e-6
 
@@ -171,8 +172,10 @@ def panorama_from_perspective(
 
 def _reach(bfov: Tensor, max_fov: float) -> Tensor:
     """Return half the crop's width and height on the plane at distance one."""
-    if not _MIN_FOV < max_fov < math.pi:
-        raise ValueError(f"max_fov: found {max_fov}, expected between 0 and pi radians")
+    if not _MIN_FOV < max_fov <= _WIDEST_FOV:
+        raise ValueError(
+            f"max_fov: found {max_fov}, expected above 0 and at most {_WIDEST_FOV} radians"
+        )
     return (bfov[..., 2:].clamp(_MIN_FOV, max_fov) / 2).tan()
 
 

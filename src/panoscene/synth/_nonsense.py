@@ -14,15 +14,15 @@ _ELL = ((-1, -1), (1, -1), (1, 0.3), (0.2, 0.3), (0.2, 1), (-1, 1))
 
 
 def sample_nonsense(rng: np.random.Generator, objects: int) -> Scene:
-    """Return boxes anywhere, of any size, with any scores, in a square or L-shaped room.
+    """Return boxes anywhere, of any size, with any scores, in a room of any shape and height.
 
-    Sizes span millimetres to tens of metres; places a point to five times the room; BFoVs and
-    half of all relations have nothing to do with the boxes.
+    Rooms are squares, Ls and stars of up to 12 corners, half a metre to 30 m across, 0.1 to 20 m
+    high; every fourth does not hold the camera. Sizes span millimetres to tens of metres; places a
+    point to five times the room; BFoVs and half of all relations have nothing to do with the
+    boxes.
     """
-    corners = _SQUARE if rng.random() < 0.5 else _ELL
-    extent = rng.uniform(0.5, 4, size=2)
-    polygon = torch.from_numpy((np.array(corners) * extent).astype(np.float32))
-    layout = Layout(polygon, 0.0, float(rng.uniform(2, 4)))
+    polygon = torch.from_numpy(_outline(rng).astype(np.float32))
+    layout = Layout(polygon, 0.0, float(10 ** rng.uniform(-1, 1.3)))
 
     def uniform(*shape: int) -> Tensor:
         return torch.from_numpy(rng.random((objects, *shape), dtype=np.float32))
@@ -60,3 +60,22 @@ def sample_nonsense(rng: np.random.Generator, objects: int) -> Scene:
             relative_yaw_wall=torch.softmax(uniform(walls, 8) * 8, -1),
         ),
     )
+
+
+def _outline(rng: np.random.Generator) -> np.ndarray:
+    """Return a simple polygon, counter-clockwise, "corners 2"."""
+    kind = rng.integers(3)
+    if kind == 0:
+        corners = np.array(_SQUARE, dtype=float)
+    elif kind == 1:
+        corners = np.array(_ELL)
+    else:
+        # corners in the order of their angles see the centre, so no two walls cross
+        count = int(rng.integers(4, 13))
+        angle = (np.arange(count) + rng.uniform(0.1, 0.9, count)) * (2 * np.pi / count)
+        radius = rng.uniform(0.3, 1, count)
+        corners = np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
+    corners = corners * 10 ** rng.uniform(-0.6, 1.2, size=2)
+    if rng.random() < 0.25:
+        corners = corners + 3 * np.ptp(corners, axis=0) * rng.uniform(-1, 1, 2)
+    return corners
