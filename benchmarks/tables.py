@@ -14,9 +14,10 @@ import sys
 from pathlib import Path
 
 from panoscene.eval import benchmark_table, experiment_table, safety_table
+from panoscene.scene import CATEGORIES, MEAN_SIZE
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ("README.md", "docs/arrange.md")
+PAGES = ("README.md", "docs/arrange.md", "docs/scene.md")
 
 
 def tables() -> dict[str, str]:
@@ -35,8 +36,20 @@ def tables() -> dict[str, str]:
         "experiment-short": experiment_table(
             {"rows": [row for row in rooms["rows"] if "without" not in row["method"]]}
         ),
+        "categories": categories_table(),
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
     }
+
+
+def categories_table() -> str:
+    """Return the names of the categories and their mean sizes, three to a line."""
+    cells = [
+        f"`{name}` {' x '.join(f'{extent:.2f}' for extent in size)}"
+        for name, size in zip(CATEGORIES, MEAN_SIZE.tolist(), strict=True)
+    ]
+    rows = [cells[first : first + 3] for first in range(0, len(cells), 3)]
+    head = "| category, mean width x depth x height in metres | | |\n| --- | --- | --- |\n"
+    return head + "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
 def main() -> int:

@@ -92,7 +92,7 @@ def test_time_to_quality_tells_when_it_is_not_reached():
 
 def test_benchmark_table_names_what_was_measured():
     table = benchmark_table({"scene_20_ms": 12.3456, "growth_s": {"10": 0.5}, "machine": {}})
-    assert "| one scene of 20 objects, 100 steps, ms | 12.3 |" in table
+    assert "one scene of 20 objects, 100 steps, ms | 12.3 |" in table
     assert "10: 0.50" in table
 
 

@@ -88,6 +88,7 @@ def arrange_scenes(
         chosen = _choose(problem, _Solved(final, solved, finite, after), kept, before)
         path = [boxes_from_variables(kept[mark], problem) for mark in sorted(marks)]
     energies = torch.stack([m.energy.sum(-1) for m in (before, between, after)])
+    outside = ((batch.inside_room < 0.5) & batch.valid).sum(-1)
     results = []
     for index, scene in enumerate(scenes):
         count = len(scene.objects.boxes)
@@ -97,7 +98,13 @@ def arrange_scenes(
             steps=settings.steps,
             changed=bool(chosen.changed[index]),
             converged=_converged(*energies[:, index].tolist()),
-            outcome=chosen.outcome[index],
+            outcome=_words(
+                chosen.outcome[index],
+                float(before.energy[index].sum()),
+                float(chosen.after.energy[index].sum()),
+            ),
+            largest_size_change=_size_change(scene.objects.boxes, boxes),
+            left_outside=int(outside[index]),
             before=before.violations(index),
             after=(chosen.after if chosen.changed[index] else before).violations(index),
         )
@@ -176,6 +183,12 @@ def _for_device(problem: Problem) -> tuple[Kernel, Any]:
 def _descend(problem: Problem, keep: set[int]) -> tuple[Tensor, dict[int, Tensor]]:
     """Run the solver with the array library that suits the device."""
     kernel, start = _for_device(problem)
+    if problem.settings.variables == "metric":
+        # boxes in the same place have no direction to part in; a tenth of a millimetre gives one
+        number = np.arange(start.shape[-1])
+        angle = np.stack([2.4 * number, 2.4 * number + 2, 4.1 * number + 1])[:, None]
+        apart = kernel.xp.asarray(1e-4 * np.cos(angle), dtype=start.dtype)
+        start = kernel.xp.concatenate([start[:3] + apart, start[3:]])
     # what overflows is not finite and will not be taken
     with np.errstate(all="ignore"):
         final, kept = descend(start, kernel, problem.settings, keep)
@@ -276,6 +289,20 @@ def _acceptable(after: Measures, before: Measures) -> Tensor:
     """Return for each scene whether nothing that must not grow has grown."""
     new, old = after.columns(), before.columns()
     return (new <= old + _SLACK * (1 + old.abs())).all(-1) & torch.isfinite(new).all(-1)
+
+
+def _words(outcome: str, start: float, end: float) -> str:
+    """Return the outcome, or that it is worse than the input, which only ``safe`` forbids."""
+    worse = outcome == "solved" and end > start + _SLACK * (1 + abs(start))
+    return "worse than the input" if worse else outcome
+
+
+def _size_change(before: OrientedBoxes, after: OrientedBoxes) -> float:
+    """Return the largest factor between sizes, at least 1."""
+    if len(before) == 0:
+        return 1.0
+    ratio = after.size / before.size
+    return float(torch.maximum(ratio, 1 / ratio).max())
 
 
 def _converged(start: float, late: float, end: float) -> bool:

@@ -57,6 +57,10 @@ class Certificate:
     """The last quarter of the steps brought less than 1 % of the energy's decrease."""
     outcome: str
     """In words: why the result is what it is."""
+    largest_size_change: float
+    """Largest factor, at least 1, by which an extent of any box grew or shrank."""
+    left_outside: int
+    """Objects that do not belong in the room by their inside_room score, so walls let them be."""
     before: Violations
     after: Violations
 

@@ -96,6 +96,8 @@ class Kernel:
     zero: Any
     one: Any
     smallest: Any
+    least_allowed: Any
+    most_allowed: Any
 
     def numpy(self) -> "Kernel":
         """Return the same constants as numpy arrays that share the memory."""
@@ -195,6 +197,10 @@ def make_kernel(problem: Problem) -> Kernel:
     bits = torch.arange(8, device=one.device)
     table = torch.tensor([_CORNER_X, _CORNER_Y], dtype=one.dtype, device=one.device)
     side_x, side_y = table[0][bits % 4], table[1][bits % 4]
+    endless = torch.full_like(problem.start[:4], math.inf)
+    bounds = -endless[:3], endless[:3]
+    if math.isfinite(settings.size_range):
+        bounds = problem.start[4:] / settings.size_range, problem.start[4:] * settings.size_range
     scenes, n = batch.valid.shape
     near = settings.clearance / 2
     m = batch.polygon.shape[1]
@@ -256,7 +262,7 @@ def make_kernel(problem: Problem) -> Kernel:
         plane_side=torch.complex(side_x, side_y),
         up_side=torch.where(bits < 4, -one, one),
         halved=one.new_tensor([1, 1, 1, 1, 0.5, 0.5, 0.5]).view(7, 1, 1),
-        lowest=torch.cat([torch.full_like(problem.start[:4], -math.inf), problem.smallest]),
+        lowest=torch.cat([-endless, problem.smallest]),
         wall_base=(count * m).view(scenes, n, 4),
         wall_side=torch.complex(side_x, side_y)[:4].expand(scenes, n, 4),
         corner_base=(count[: scenes * n] * 8).view(scenes, n, 1),
@@ -265,4 +271,6 @@ def make_kernel(problem: Problem) -> Kernel:
         zero=one * 0,
         one=one,
         smallest=problem.smallest,
+        least_allowed=torch.cat([-endless, bounds[0]]),
+        most_allowed=torch.cat([endless, bounds[1]]),
     )

@@ -1,5 +1,6 @@
 """Settings of the arrangement optimiser and its three presets."""
 
+import math
 from typing import Annotated, Literal
 
 import torch
@@ -128,6 +129,8 @@ class ArrangementSettings(_Frozen):
     clearance: NonNegative = 0.0
     """Metres: objects are held this far apart and half as far from walls, floor and ceiling, and
     contact relations are content with this gap, so that contact never ends in penetration."""
+    size_range: float = Field(default=math.inf, ge=1)
+    """Largest factor by which an extent may grow or shrink; 1 holds sizes as they are."""
     solver: Literal["sgd", "adam"] = "adam"
     steps: int = Field(default=100, ge=0)
     learning_rate: Positive = 1.0
@@ -222,6 +225,7 @@ _DEFAULT = ArrangementSettings(
     projection="edges",
     variables="metric",
     clearance=0.004,
+    size_range=1.35,
     solver="adam",
     steps=50,
     learning_rate=0.1,

@@ -45,14 +45,16 @@ def steps(start: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterat
 
 def _sgd(x: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[Array]:
     """Yield the variables after every step of momentum descent (paper, Sec. 3.3)."""
+    xp = kernel.xp
     direction = settings.direction_gradient_scale
-    velocity = kernel.xp.zeros_like(x)
+    velocity = xp.zeros_like(x)
     for _ in range(settings.steps):
         gradient = energy_gradient(x, kernel)
         if direction != 1:
-            gradient = kernel.xp.concatenate([gradient[:2] * direction, gradient[2:]])
+            gradient = xp.concatenate([gradient[:2] * direction, gradient[2:]])
         velocity = settings.momentum * velocity + gradient
         x = x - settings.learning_rate * velocity
+        x = xp.minimum(xp.maximum(x, kernel.least_allowed), kernel.most_allowed)
         yield x
 
 
@@ -70,4 +72,5 @@ def _adam(x: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[A
         scale = 1 / (1 - _SECOND_MOMENTUM ** (step + 1))
         # the tiny offset keeps the square root differentiable for variables that never moved
         x = x - first * mean / (xp.sqrt(square * scale + 1e-12) + _DAMPING)
+        x = xp.minimum(xp.maximum(x, kernel.least_allowed), kernel.most_allowed)
         yield x

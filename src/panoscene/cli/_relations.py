@@ -59,6 +59,9 @@ def with_relations(scene: Scene, file: Path, *, keep: bool = False) -> Scene:
         return scene
     with blaming(file):
         found = relations_from_boxes(
-            scene.objects.boxes, scene.layout, scene.panorama.camera_height
+            scene.objects.boxes,
+            scene.layout,
+            scene.panorama.camera_height,
+            inside="any_corner",  # as convert and arrange: the boxes may be off
         )
     return replace(scene, relations=found)

@@ -16,7 +16,7 @@ COLUMNS: tuple[tuple[str, Callable[[Violations], int | float], str], ...] = (
     ("energy", lambda v: v.energy, ".2f"),
     ("colliding\npairs", lambda v: v.colliding_pairs, ".0f"),
     ("worst pene-\ntration, cm", lambda v: 100 * v.worst_penetration, ".1f"),
-    ("worst out of\nroom, cm", lambda v: 100 * v.worst_out_of_room, ".1f"),
+    ("worst out of\nroom, cm", lambda v: 100 * v.worst_out_of_room + 0.0, ".1f"),
 )
 """What the table shows of the violations before and after."""
 
@@ -39,7 +39,10 @@ def say_certificates(rows: Sequence[tuple[Path, Certificate]]) -> None:
             f"{value(certificate.before):{form}} → {value(certificate.after):{form}}"
             for _, value, form in COLUMNS
         ]
-        table.add_row(Text(file.name), *cells, Text(certificate.outcome))
+        words = certificate.outcome
+        if certificate.left_outside:
+            words += f"; {certificate.left_outside} outside, left there"
+        table.add_row(Text(file.name), *cells, Text(words))
     _print(table)
 
 
