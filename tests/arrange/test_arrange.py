@@ -360,7 +360,9 @@ def test_energy_of_other_boxes_is_that_of_the_variables():
     for settings in (PRESETS["default"], PRESETS["released"]):
         start = energy(batch, settings).sum()
         torch.testing.assert_close(energy(batch, settings, boxes=batch.boxes).sum(), start)
-        states = dict(itertools.islice(solver_states(batch, settings), 20))
+        running = solver_states(batch, settings)
+        states = dict(itertools.islice(running, 20))
+        assert torch.is_grad_enabled(), "a generator that is held must not switch gradients off"
         assert energy(batch, settings, boxes=states[20]).sum() < 0.7 * start
 
 

@@ -168,8 +168,15 @@ def solver_states(
     with torch.no_grad():
         problem = make_problem(batch, settings)
         kernel, start = _for_device(problem)
-        for number, x in enumerate(steps(start, kernel, settings), start=1):
-            yield number, boxes_from_variables(torch.as_tensor(x), problem)
+    following = enumerate(steps(start, kernel, settings), start=1)
+    while True:
+        # the mode must not stay switched while a caller holds the generator
+        with torch.no_grad():
+            number, x = next(following, (0, None))
+            if x is None:
+                return
+            boxes = boxes_from_variables(torch.as_tensor(x), problem)
+        yield number, boxes
 
 
 def _for_device(problem: Problem) -> tuple[Kernel, Any]:
