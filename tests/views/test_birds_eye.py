@@ -10,9 +10,9 @@ import torch
 from PIL import Image
 
 from panoscene.scene import Objects, Scene
+from panoscene.style import ALARM
 from panoscene.synth import PerturbNoise, perturb_scene, sample_room
 from panoscene.views import draw_birds_eye, draw_comparison
-from panoscene.views._style import ALARM
 
 SMALL = (620, 420)
 

@@ -38,6 +38,14 @@ from ._relations import relations_from_boxes as relations_from_boxes
 from ._relations import relative_yaw_angle as relative_yaw_angle
 from ._relations import relative_yaw_bins as relative_yaw_bins
 from ._schema import scene_json_schema as scene_json_schema
+from ._surfaces import Surface as Surface
+from ._surfaces import SurfaceKind as SurfaceKind
+from ._surfaces import box_mesh as box_mesh
+from ._surfaces import object_mesh as object_mesh
+from ._surfaces import object_surface as object_surface
+from ._surfaces import place_vertices as place_vertices
+from ._surfaces import room_surfaces as room_surfaces
+from ._surfaces import scene_surfaces as scene_surfaces
 from ._triples import PREDICATES as PREDICATES
 from ._triples import Triple as Triple
 from ._triples import object_names as object_names

@@ -126,12 +126,18 @@ def _panorama_problems(panorama: PanoramaModel) -> list[Problem]:
 def _layout_problems(layout: LayoutModel) -> list[Problem]:
     problems: list[Problem] = []
     corners = len(layout.floor_polygon)
-    fault = polygon_problem(torch.tensor(layout.floor_polygon, dtype=torch.float64))
-    if fault is not None:
-        expected = "a simple polygon, counter-clockwise from above"
-        if "clockwise" in fault:
-            expected += " (reverse the corners, and with them the order of the walls)"
-        problems.append(Problem("$.layout.floor_polygon", fault, expected))
+    for field, polygon in (
+        ("floor_polygon", layout.floor_polygon),
+        ("raw_polygon", layout.raw_polygon),
+    ):
+        if polygon is None:
+            continue
+        fault = polygon_problem(torch.tensor(polygon, dtype=torch.float64))
+        if fault is not None:
+            expected = "a simple polygon, counter-clockwise from above"
+            if "clockwise" in fault:
+                expected += " (reverse the corners, and with them the order of the walls)"
+            problems.append(Problem(f"$.layout.{field}", fault, expected))
     if layout.ceiling_height <= layout.floor_height:
         expected = f"more than the floor_height {layout.floor_height:g}"
         problems.append(Problem("$.layout.ceiling_height", f"{layout.ceiling_height:g}", expected))

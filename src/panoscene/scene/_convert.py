@@ -77,6 +77,8 @@ def scene_to_json(scene: Scene, *, file: str = "scene") -> dict[str, Any]:
     }
     if layout.wall_score is not None:
         document["layout"]["wall_score"] = numbers_from_tensor(layout.wall_score)
+    if layout.raw_polygon is not None:
+        document["layout"]["raw_polygon"] = numbers_from_tensor(layout.raw_polygon)
     if scene.relations is not None:
         document["relations"] = relations_to_json(
             scene.relations, object_names(scene.objects), len(layout.floor_polygon), file
@@ -156,7 +158,7 @@ def _scene_from_model(model: SceneModel, dtype: torch.dtype) -> Scene:
     walls = len(model.layout.floor_polygon)
     relations = model.relations
     names = names_in_model(model.objects)
-    score = model.layout.wall_score
+    score, raw = model.layout.wall_score, model.layout.raw_polygon
     return Scene(
         panorama=Panorama(**dict(model.panorama)),
         layout=Layout(
@@ -164,6 +166,7 @@ def _scene_from_model(model: SceneModel, dtype: torch.dtype) -> Scene:
             floor_height=model.layout.floor_height,
             ceiling_height=model.layout.ceiling_height,
             wall_score=None if score is None else tensor_from_numbers(score, (-1,), dtype),
+            raw_polygon=None if raw is None else tensor_from_numbers(raw, (-1, 2), dtype),
         ),
         objects=_objects_from_models(model.objects, model.panorama.camera_height, dtype),
         relations=None

@@ -59,6 +59,8 @@ class Layout:
     """World z of the ceiling in metres."""
     wall_score: Float[Tensor, " corners"] | None = None
     """Confidence of each wall in [0, 1], when the source gives it."""
+    raw_polygon: Float[Tensor, "raw_corners 2"] | None = None
+    """The floor polygon as it was read from the photo, before it was made regular."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,6 +97,8 @@ class LayoutModel(Model):
     """World z of the ceiling."""
     wall_score: list[Score] | None = None
     """Confidence of each wall."""
+    raw_polygon: Annotated[list[Point2], Field(min_length=3, max_length=10_000)] | None = None
+    """The corners as they were read from the photo, before the polygon was made regular."""
 
 
 class BoxModel(Model):

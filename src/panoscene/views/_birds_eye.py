@@ -7,6 +7,7 @@ import torch
 
 from panoscene.geometry import polygon_area
 from panoscene.scene import Scene
+from panoscene.style import BODY, FAINT_INK, MARGIN, TITLE
 from panoscene.views._drawing import (
     dimension_shapes,
     draw_dimensions,
@@ -29,7 +30,6 @@ from panoscene.views._panels import (
     natural_size,
     number_objects,
 )
-from panoscene.views._style import BODY, FAINT_INK, MARGIN, TITLE
 
 
 def draw_birds_eye(

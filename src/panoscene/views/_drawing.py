@@ -5,10 +5,7 @@ import shapely
 
 from panoscene.geometry import box_footprint
 from panoscene.scene import Scene
-from panoscene.views._labels import Label
-from panoscene.views._page import Page
-from panoscene.views._pieces import Bounds, Contact, Piece, Plan, View
-from panoscene.views._style import (
+from panoscene.style import (
     ALARM,
     CONTACT,
     CONTACT_RIM,
@@ -32,6 +29,9 @@ from panoscene.views._style import (
     WALL,
     group_of,
 )
+from panoscene.views._labels import Label
+from panoscene.views._page import Page
+from panoscene.views._pieces import Bounds, Contact, Piece, Plan, View
 
 DIMENSION_GAP = 34.0
 """Pixels between what is drawn and the dimension lines."""

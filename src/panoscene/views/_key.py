@@ -8,10 +8,7 @@ import numpy as np
 import shapely
 
 from panoscene.scene import CATEGORIES
-from panoscene.views._drawing import draw_alarm, draw_camera, draw_contact, draw_front, draw_piece
-from panoscene.views._page import Page
-from panoscene.views._pieces import Contact, Piece, Plan
-from panoscene.views._style import (
+from panoscene.style import (
     BODY,
     FAINT_INK,
     GROUP_COLOURS,
@@ -23,6 +20,9 @@ from panoscene.views._style import (
     group_of,
     words,
 )
+from panoscene.views._drawing import draw_alarm, draw_camera, draw_contact, draw_front, draw_piece
+from panoscene.views._page import Page
+from panoscene.views._pieces import Contact, Piece, Plan
 
 Mark = Literal[
     "front", "overhead", "contact", "collision", "outside", "both", "reference", "camera"

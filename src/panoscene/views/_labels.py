@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from panoscene.style import words
 from panoscene.views._pieces import Bounds, Piece, Plan
-from panoscene.views._style import words
 
 MeasureText = Callable[[str], tuple[float, float]]
 """Width and height in pixels of a text in the labels' type."""

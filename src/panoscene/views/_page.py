@@ -20,7 +20,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox, IdentityTransform
 
 from panoscene.scene import write_atomically
-from panoscene.views._style import FONT, INK, LABEL, PAPER
+from panoscene.style import FONT, INK, LABEL, PAPER
 
 _DPI = 100
 _POINTS = 72 / _DPI

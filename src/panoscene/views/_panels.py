@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from panoscene.scene import Scene
+from panoscene.style import group_of
 from panoscene.views._key import longest_key
 from panoscene.views._labels import Label
 from panoscene.views._pieces import Bounds, Plan, View, make_plan, room_turn, scene_bounds
-from panoscene.views._style import group_of
 
 KEY_WIDTH = 256.0
 HEADER, FOOTER = 74.0, 54.0

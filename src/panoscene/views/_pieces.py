@@ -10,7 +10,7 @@ from jaxtyping import Float, Int64
 
 from panoscene.geometry import OrientedBoxes, box_footprint, penetration_depth, wall_normals
 from panoscene.scene import CATEGORIES, Relations, Scene, relations_from_boxes
-from panoscene.views._style import MOST_WALL, NO_FRONT, OVERHEAD, WALL_THICKNESS
+from panoscene.style import MOST_WALL, NO_FRONT, OVERHEAD, WALL_THICKNESS
 
 TOLERANCE = 0.01
 """Metres of penetration, or of sticking out of the room, from which it is shown."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panoscene.scene import CATEGORIES
-from panoscene.views._style import FLOOR, GROUP_COLOURS, GROUPS, INK, OPAQUE, group_of, words
+from panoscene.style import FLOOR, GROUP_COLOURS, GROUPS, INK, OPAQUE, group_of, words
 
 # Full colour-vision deficiencies in linear RGB (Machado, Oliveira, Fernandes 2009).
 VISION = {

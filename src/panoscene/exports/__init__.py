@@ -1,0 +1,1 @@
+"""Scenes for other programs: GLB, OBJ, floor plans as SVG and DXF."""

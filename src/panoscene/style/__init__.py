@@ -1,0 +1,33 @@
+"""The one look of all pictures, pages and models: colours of categories, type sizes, lines."""
+
+from panoscene.style._style import ALARM as ALARM
+from panoscene.style._style import BODY as BODY
+from panoscene.style._style import CONTACT as CONTACT
+from panoscene.style._style import CONTACT_RIM as CONTACT_RIM
+from panoscene.style._style import CONTACT_WIDTH as CONTACT_WIDTH
+from panoscene.style._style import FAINT_INK as FAINT_INK
+from panoscene.style._style import FLOOR as FLOOR
+from panoscene.style._style import FONT as FONT
+from panoscene.style._style import FRONT as FRONT
+from panoscene.style._style import GROUP_COLOURS as GROUP_COLOURS
+from panoscene.style._style import GROUPS as GROUPS
+from panoscene.style._style import HEAVY as HEAVY
+from panoscene.style._style import INK as INK
+from panoscene.style._style import LABEL as LABEL
+from panoscene.style._style import LEADER as LEADER
+from panoscene.style._style import MARGIN as MARGIN
+from panoscene.style._style import MOST_WALL as MOST_WALL
+from panoscene.style._style import NO_FRONT as NO_FRONT
+from panoscene.style._style import OPAQUE as OPAQUE
+from panoscene.style._style import OUTLINE as OUTLINE
+from panoscene.style._style import OVERHEAD as OVERHEAD
+from panoscene.style._style import PAPER as PAPER
+from panoscene.style._style import REFERENCE as REFERENCE
+from panoscene.style._style import SEE_THROUGH as SEE_THROUGH
+from panoscene.style._style import SMALL as SMALL
+from panoscene.style._style import THIN as THIN
+from panoscene.style._style import TITLE as TITLE
+from panoscene.style._style import WALL as WALL
+from panoscene.style._style import WALL_THICKNESS as WALL_THICKNESS
+from panoscene.style._style import group_of as group_of
+from panoscene.style._style import words as words
