@@ -131,7 +131,7 @@ def _polygon_triangles(corners: Float[Tensor, "corners 2"]) -> Int64[Tensor, "fa
         raise ValueError("layout.floor_polygon: expected a simple polygon; see polygon_problem")
     pieces = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon))
     corner = torch.tensor(pieces.tolist(), dtype=torch.float64).reshape(-1, 4, 2)[:, :3]
-    faces = (corner[:, :, None] - points).norm(dim=-1).argmin(dim=-1)
+    faces = torch.cdist(corner.flatten(0, 1), points).argmin(dim=-1).reshape(-1, 3)
     (ax, ay), (bx, by), (cx, cy) = (place.unbind(-1) for place in points[faces].unbind(1))
     clockwise = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0
-    return torch.where(clockwise[:, None], faces.flip(-1), faces).to(corners.device)
+    return torch.where(clockwise[:, None], faces.flip([-1]), faces).to(corners.device)

@@ -1,0 +1,121 @@
+"""Predictions are written once, as scene.json, and scored from disk by anybody."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from panoscene.eval._methods import METHODS, Method
+from panoscene.scene import Scene, write_atomically, write_scene
+from panoscene.synth import EstimateNoise, estimate_scene, sample_room
+
+TARGETS, PREDICTIONS, MANIFEST = "targets", "predictions", "export.json"
+"""Names inside an export: the truth, one folder for each method, and what was done."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedMethod:
+    """What is known of the predictions in one folder."""
+
+    kind: str
+    description: str
+
+
+def sample_targets(count: int, seed: int) -> list[Scene]:
+    """Return sampled rooms of 4 to 24 objects, named by their number.
+
+    Room k of a seed is the same whatever the count.
+
+    Raises:
+        ValueError: a count or seed below 0.
+    """
+    if count < 0 or seed < 0:
+        raise ValueError(f"count, seed: found {count} and {seed}, expected 0 or more")
+    rooms: list[Scene] = []
+    for k in range(count):
+        rng = np.random.default_rng([seed, k])
+        room = sample_room(rng, objects=int(rng.integers(4, 25)))
+        rooms.append(replace(room, name=f"room-{k:04d}"))
+    return rooms
+
+
+def export_predictions(
+    output: Path,
+    targets: Sequence[Scene],
+    *,
+    seed: int = 0,
+    methods: Mapping[str, Method] = METHODS,
+    noise: EstimateNoise | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, ExportedMethod]:
+    """Return the methods whose predictions for the targets now lie in a folder.
+
+    It gets ``targets/NAME.json``, ``predictions/METHOD/NAME.json`` and last ``export.json``,
+    which says how they were made; an export without it is not complete.
+
+    Args:
+        output: folder; it is made if it does not exist.
+        targets: true scenes with different names.
+        seed: of the simulated estimates; estimate k depends on seed and k only.
+        methods: what predicts.
+        noise: how wrong the simulated estimates are.
+        progress: called with a line of text before each method.
+
+    Raises:
+        ValueError: names that are missing, double or no file names.
+        OSError: something cannot be written.
+    """
+    tell = progress or (lambda _text: None)
+    names = [scene.name for scene in targets]
+    check_names(names)
+    noise = noise or EstimateNoise()
+    tell("estimates")
+    estimates = [
+        estimate_scene(scene, np.random.default_rng([seed, k, 1]), noise)
+        for k, scene in enumerate(targets)
+    ]
+    _write_folder(output / TARGETS, names, targets)
+    done: dict[str, ExportedMethod] = {}
+    for name, method in methods.items():
+        tell(name)
+        scenes = method.run(targets, estimates)
+        _write_folder(output / PREDICTIONS / name, names, scenes)
+        done[name] = ExportedMethod(method.kind, method.description)
+    manifest = {
+        "schema": "panoscene/export",
+        "version": 1,
+        "scenes": len(targets),
+        "seed": seed,
+        "noise": asdict(noise),
+        "methods": {name: asdict(method) for name, method in done.items()},
+    }
+    write_atomically(output / MANIFEST, json.dumps(manifest, indent=2) + "\n")
+    return done
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Refuse scene names that cannot be names of different files.
+
+    Raises:
+        ValueError: names that are missing, double or no file names.
+    """
+    seen: set[str] = set()
+    for name in names:
+        if not name or name != Path(name).name or name.startswith("."):
+            raise ValueError(f"name: found {name!r}, expected one that can name a file")
+        if name in seen:
+            raise ValueError(f"name: found {name!r} twice, expected different names")
+        seen.add(name)
+
+
+def _write_folder(folder: Path, names: Sequence[str], scenes: Sequence[Scene]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    expected = {f"{name}.json" for name in names}
+    for stale in folder.glob("*.json"):
+        # a prediction of an earlier, larger export would be scored with this one
+        if stale.name not in expected:
+            stale.unlink()
+    for name, scene in zip(names, scenes, strict=True):
+        write_scene(scene, folder / f"{name}.json")

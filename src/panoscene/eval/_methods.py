@@ -1,0 +1,134 @@
+"""The methods that a score table compares: ours, the authors' settings, baselines and oracles."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Literal
+
+import torch
+
+from panoscene.arrange import PRESETS, arrange_scenes
+from panoscene.geometry import OrientedBoxes, direction_from_lonlat, wrap_angle
+from panoscene.scene import MEAN_SIZE, Layout, Objects, Scene, Shapes, relations_from_boxes
+
+MethodKind = Literal["ours", "released", "input", "baseline", "oracle"]
+
+_CHUNK = 64
+_ROOM_SIDE = 4.0
+_CEILING = 2.6
+_FARTHEST = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One row of a score table."""
+
+    kind: MethodKind
+    """``oracle``: it was told part of the truth; ``baseline``: it does not think."""
+    description: str
+    run: Callable[[Sequence[Scene], Sequence[Scene]], list[Scene]]
+    """From the targets and the estimates of the same rooms to predictions."""
+
+
+def mean_box_scene(estimate: Scene) -> Scene:
+    """Return the trivial baseline: what is known without looking at layout, pose or context.
+
+    Each detection becomes a box of its category's mean size that faces the camera, in the
+    direction of its BFoV, at the distance where the mean height fills the BFoV's (at most 8 m).
+    The room is a square of 4 m around the camera with a ceiling at 2.6 m. Relations are those of
+    these boxes.
+    """
+    objects, camera = estimate.objects, estimate.panorama.camera_height
+    lon, lat, _, height = objects.bfov.unbind(-1)
+    size = MEAN_SIZE[objects.category].to(lon)
+    half = (height / 2).clamp(1e-3, math.pi / 2 - 1e-3)
+    distance = (size[:, 2] / 2 / torch.tan(half)).clamp(0.3, _FARTHEST)
+    ray = direction_from_lonlat(torch.stack([lon, lat], dim=-1))
+    centre = distance[:, None] * ray + ray.new_tensor([0.0, 0.0, camera])
+    boxes = OrientedBoxes(centre, size, wrap_angle(math.pi - lon))
+    side = _ROOM_SIDE / 2
+    square = centre.new_tensor([[-side, -side], [side, -side], [side, side], [-side, side]])
+    layout = Layout(square, ceiling_height=max(_CEILING, camera + 0.1))
+    return replace(
+        estimate,
+        layout=layout,
+        objects=replace(objects, boxes=boxes, shapes=Shapes()),
+        relations=relations_from_boxes(boxes, layout, camera, inside="any_corner"),
+    )
+
+
+def with_layout_of(estimate: Scene, target: Scene) -> Scene:
+    """Return the estimate in the target's room; relations to walls follow from its boxes."""
+    derived = relations_from_boxes(
+        estimate.objects.boxes, target.layout, estimate.panorama.camera_height, inside="any_corner"
+    )
+    old = estimate.relations
+    kept = derived if old is None else replace(
+        old, touching_wall=derived.touching_wall, relative_yaw_wall=derived.relative_yaw_wall
+    )  # fmt: skip
+    return replace(estimate, layout=target.layout, relations=kept)
+
+
+def with_boxes_of(estimate: Scene, target: Scene) -> Scene:
+    """Return the target's objects in the estimated room, with the relations that follow."""
+    objects: Objects = target.objects
+    return replace(
+        estimate,
+        objects=objects,
+        relations=relations_from_boxes(
+            objects.boxes, estimate.layout, estimate.panorama.camera_height, inside="any_corner"
+        ),
+    )
+
+
+def _arranged(estimates: Sequence[Scene], preset: str) -> list[Scene]:
+    """Return repaired scenes, many at once."""
+    return [
+        result.scene
+        for first in range(0, len(estimates), _CHUNK)
+        for result in arrange_scenes(estimates[first : first + _CHUNK], PRESETS[preset])
+    ]
+
+
+def _pairs(
+    change: Callable[[Scene, Scene], Scene],
+) -> Callable[[Sequence[Scene], Sequence[Scene]], list[Scene]]:
+    def run(targets: Sequence[Scene], estimates: Sequence[Scene]) -> list[Scene]:
+        return [change(*pair) for pair in zip(estimates, targets, strict=True)]
+
+    return run
+
+
+METHODS = MappingProxyType(
+    {
+        "estimates": Method(
+            "input", "simulated networks, nothing repaired", lambda _, estimates: list(estimates)
+        ),
+        "default": Method(
+            "ours",
+            "estimates repaired with the preset default",
+            lambda _, estimates: _arranged(estimates, "default"),
+        ),
+        "released": Method(
+            "released",
+            "estimates repaired with the authors' released settings",
+            lambda _, estimates: _arranged(estimates, "released"),
+        ),
+        "mean-box": Method(
+            "baseline",
+            "mean sizes facing the camera in a square room",
+            lambda _, estimates: [mean_box_scene(scene) for scene in estimates],
+        ),
+        "true-layout": Method(
+            "oracle",
+            "estimates with the true layout, repaired with default",
+            lambda targets, estimates: _arranged(
+                _pairs(with_layout_of)(targets, estimates), "default"
+            ),
+        ),
+        "true-boxes": Method("oracle", "true boxes in the estimated layout", _pairs(with_boxes_of)),
+        "truth": Method("oracle", "the targets themselves", lambda targets, _: list(targets)),
+    }
+)
+"""Every method by the name of its folder of predictions."""
