@@ -1,4 +1,4 @@
-# make demo    repair a disturbed sample room; pictures in demo/
+# make demo    repair a disturbed sample room; pictures and report.html in demo/
 # make test    everything CI runs: tests, doctests, lint, types, documentation
 # make lint    the checks of a commit, on all files
 # make docs    the documentation, in site/
@@ -18,8 +18,7 @@ INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
 demo: $(VENV)/.runtime-installed
 	@$(BIN)/panoscene demo -o demo
-	@echo "The room from above, before and after the repair:"
-	@ls -1 demo/*.png
+	@echo "Look around in the repaired room: open demo/report.html in a browser."
 
 test: $(VENV)/.dev-installed
 	@OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10 $(PYTEST_FLAGS)

@@ -20,7 +20,7 @@ def placed(scene: Scene) -> tuple[Page, Panel, dict[int, Label], dict[int, str]]
     panels = make_panels([("", scene)], None, True, (1200, 900))
     names = [place_names(panels[0].plan, page.label_size)]
     numbers = number_objects(panels, names)
-    return page, panels[0], _place_labels(page, panels[0], names[0], numbers[0]), numbers[0]
+    return page, panels[0], _place_labels(page, panels[0], names[0], numbers[0], []), numbers[0]
 
 
 def rectangle(page: Page, label: Label) -> shapely.Polygon:

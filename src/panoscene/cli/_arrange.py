@@ -22,20 +22,35 @@ from panoscene.cli._tables import say_certificates
 from panoscene.cli._terminal import complain, json_text, say, say_json
 from panoscene.scene import Scene, SceneFormatError, read_scene
 
-PICTURE = ".before-after.png"
-"""What the name of a picture ends in; never that of the photo next to the scene."""
+PICTURE, REPORT, ANIMATION = ".before-after.png", ".report.html", ".repair.webp"
+"""What the names of pictures end in; never that of the photo next to the scene."""
 BATCH = 64
 """Scenes that are solved together."""
 BATCH_PAIRS = BATCH * 40**2
 """Pairs of objects in a batch, padding included, so that memory stays below some 100 MB."""
 
 
+@dataclass(frozen=True, slots=True)
+class Extras:
+    """What to draw of each repaired scene."""
+
+    picture: bool = False
+    report: bool = False
+    animation: bool = False
+
+    @property
+    def endings(self) -> dict[str, str]:
+        """Return what is drawn, with the ending of its file's name."""
+        known = {"picture": PICTURE, "report": REPORT, "animation": ANIMATION}
+        return {name: ending for name, ending in known.items() if getattr(self, name)}
+
+
 def arrange_files(
     arguments: Sequence[str],
     output: Path,
     settings: ArrangementSettings,
+    extras: Extras,
     *,
-    picture: bool,
     as_json: bool,
 ) -> int:
     """Repair the scenes that arguments name, say what happened, and return the exit code."""
@@ -45,11 +60,11 @@ def arrange_files(
     with progress_bar("arranging", len(files)) as advance:
         for start in range(0, len(files), BATCH):
             for result in _arranged(files[start : start + BATCH], settings):
-                results[result.file] = _written(result, targets[result.file], picture=picture)
+                results[result.file] = _written(result, targets[result.file], settings, extras)
                 advance(1)
     in_order = [results[file] for file in files]
     if as_json:
-        say_json([_as_json(result, targets[result.file], picture) for result in in_order])
+        say_json([_as_json(result, targets[result.file], extras) for result in in_order])
     else:
         _say_table(in_order, targets[files[0]] if len(files) == 1 else output)
     return 2 if any(result.error for result in in_order) else 0
@@ -108,15 +123,16 @@ def _solved(
         yield _Result(file, scene, found.certificate, found.scene)
 
 
-def _written(result: _Result, target: Path, *, picture: bool) -> _Result:
+def _written(
+    result: _Result, target: Path, settings: ArrangementSettings, extras: Extras
+) -> _Result:
     """Write what belongs to a result, the scene last: where it is, everything is."""
     if result.scene is None or result.certificate is None or result.arranged is None:
         complain(result.error)
         return result
     document = {"schema": "panoscene/certificate", "version": 1, **result.certificate.as_dict()}
     try:
-        if picture:
-            _draw(result.scene, result.arranged, result.certificate, beside(target, PICTURE))
+        _draw(result, target, settings, extras)
         write_text(beside(target, CERTIFICATE), json_text(document) + "\n")
         write_scene_from(result.file, result.arranged, target)
     except ValueError as error:
@@ -126,21 +142,49 @@ def _written(result: _Result, target: Path, *, picture: bool) -> _Result:
     return _Result(result.file, certificate=result.certificate)
 
 
-def _draw(before: Scene, after: Scene, certificate: Certificate, path: Path) -> None:
+def _draw(result: _Result, target: Path, settings: ArrangementSettings, extras: Extras) -> None:
+    """Draw what was asked for."""
+    before, after, certificate = result.scene, result.arranged, result.certificate
+    if not extras.endings or before is None or after is None or certificate is None:
+        return
     # matplotlib takes as long to load as a scene to repair
-    from panoscene.views import describe_violations, draw_comparison  # noqa: PLC0415
+    from panoscene.cli._photos import photo_path  # noqa: PLC0415
+    from panoscene.views import (  # noqa: PLC0415
+        describe_violations,
+        draw_animation,
+        draw_comparison,
+        render_panorama,
+        write_report,
+    )
 
-    captions = [describe_violations(v) for v in (certificate.before, certificate.after)]
-    with writing(path), blaming(path):
-        draw_comparison([("Before", before), ("After", after)], path, captions=captions)
+    if extras.picture:
+        captions = [describe_violations(v) for v in (certificate.before, certificate.after)]
+        path = beside(target, PICTURE)
+        with writing(path), blaming(path):
+            draw_comparison([("Before", before), ("After", after)], path, captions=captions)
+    if extras.report:
+        path = beside(target, REPORT)
+        photo = photo_path(before, result.file, None)
+        with writing(path), blaming(path):
+            write_report(
+                path,
+                after,
+                image=render_panorama(after) if photo is None else photo,
+                image_caption="" if photo is not None else "Rendered from the boxes.",
+                before=before,
+                certificate=certificate,
+            )
+    if extras.animation:
+        path = beside(target, ANIMATION)
+        with writing(path), blaming(path):
+            draw_animation(before, path, settings=settings, title=before.name)
 
 
-def _as_json(result: _Result, target: Path, picture: bool) -> dict[str, Any]:
+def _as_json(result: _Result, target: Path, extras: Extras) -> dict[str, Any]:
     if result.certificate is None:
         return {"scene": str(result.file), "ok": False, "error": result.error}
     found: dict[str, Any] = {"scene": str(result.file), "ok": True, "output": str(target)}
-    if picture:
-        found["picture"] = str(beside(target, PICTURE))
+    found |= {name: str(beside(target, ending)) for name, ending in extras.endings.items()}
     return {**found, "certificate": result.certificate.as_dict()}
 
 

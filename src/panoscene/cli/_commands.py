@@ -51,6 +51,8 @@ def arrange(
     settings: OptionalFile = None,
     steps: OptionalCount = None,
     picture: Flag = False,
+    report: Flag = False,
+    animation: Flag = False,
     json: Flag = False,
 ) -> int:
     """Repair scenes: move objects out of each other, back into the room, and onto the floor.
@@ -80,13 +82,16 @@ def arrange(
             {"weights": {"touching": 0.5}, "clearance": 0.01}.
         steps: Steps of the descent, instead of the preset's.
         picture: Also draw each room from above before and after, in NAME.before-after.png.
+        report: Also write a page to look around in, before and after, as NAME.report.html.
+        animation: Also show the boxes moving, in NAME.repair.webp; takes half a minute each.
         json: Print one list with everything instead of a table.
     """
-    from panoscene.cli._arrange import arrange_files
+    from panoscene.cli._arrange import Extras, arrange_files
     from panoscene.cli._settings import chosen_settings
 
     chosen = chosen_settings(preset, settings, steps)
-    return arrange_files(scenes, output, chosen, picture=picture, as_json=json)
+    extras = Extras(picture=picture, report=report, animation=animation)
+    return arrange_files(scenes, output, chosen, extras, as_json=json)
 
 
 def relations(
@@ -140,6 +145,7 @@ def convert(
     view: Annotated[str | None, arg(metavar="LON,LAT,FOV", help_behavior_hint="")] = None,
     yaw_deg: OptionalNumber = None,
     size: OptionalCount = None,
+    photo: OptionalFile = None,
 ) -> int:
     """Convert boxes, scenes and panoramas; the names of the files say from what to what.
 
@@ -155,6 +161,14 @@ def convert(
         panoscene convert room.json -o boxes.csv
         panoscene convert room.json -o room.graphml
 
+    It also becomes a model for other programs (.glb for engines and Blender, with the photo on
+    its walls; .obj), a floor plan with dimensions (.svg, .dxf), or a page to look around in
+    (.html). A .glb made here, and edited elsewhere, becomes a scene again.
+
+        panoscene convert room.json -o room.glb --photo photo.jpg
+        panoscene convert room.json -o plan.dxf
+        panoscene convert room.glb -o edited.json
+
     A panorama becomes the six faces of a cube, what a pinhole camera would see, or itself turned.
 
         panoscene convert photo.jpg -o faces --cube
@@ -162,7 +176,7 @@ def convert(
         panoscene convert photo.jpg -o turned.jpg --yaw-deg 30
 
     Args:
-        input: boxes .csv, scene .json, or a 2:1 panorama (.jpg .png .webp .tif .bmp).
+        input: boxes .csv, scene .json, model .glb, or a 2:1 panorama (.jpg .png .webp .tif .bmp).
         output: The file to write, or for --cube the folder.
         room: Corners of the floor plan in order, either way round, in metres.
         ceiling: Height of the ceiling in metres; 2.6 for a table.
@@ -173,13 +187,14 @@ def convert(
             above the horizon) that is FOV degrees wide.
         yaw_deg: Turn the camera by this many degrees to the left; the picture moves to the right.
         size: Width of each face or view in pixels; without it as sharp as the panorama.
+        photo: For .glb and .html: the panorama, instead of the one that the scene names.
     """
     from panoscene.cli._convert import SceneOptions, convert_file
     from panoscene.cli._pictures import PanoramaOptions
 
     scene_options = SceneOptions(room, ceiling, camera_height, name)
     panorama_options = PanoramaOptions(cube or None, view, yaw_deg, size)
-    return convert_file(input, output, scene_options, panorama_options)
+    return convert_file(input, output, scene_options, panorama_options, photo)
 
 
 def schema() -> int:

@@ -11,6 +11,7 @@ from torch import Tensor
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import blaming
 from panoscene.cli._kinds import kind_of, write_as
+from panoscene.cli._models import MODELS, read_model, write_model
 from panoscene.cli._pictures import PanoramaOptions, convert_panorama
 from panoscene.cli._relations import with_relations
 from panoscene.cli._terminal import note
@@ -20,9 +21,14 @@ from panoscene.scene import Layout, Scene, read_box_table, read_scene, scene_fro
 POSSIBLE = """\
   boxes.csv --room ...   to  scene .json, or its relations: .relations.json .graphml
   scene.json             to  scene .json, boxes .csv, or relations: .relations.json .graphml
+  scene.json             to  a model .glb .obj, a floor plan .svg .dxf, or a page .html
+  model.glb              to  scene .json, if panoscene made it
   panorama --cube        to  a folder of six faces
   panorama --view ...    to  a picture: .png .jpg .webp .tif .bmp
   panorama --yaw-deg ... to  a picture"""
+
+FROM_SCENE = {"scene", "graph JSON", "GraphML", "table", *MODELS}
+"""What a scene can become."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +42,11 @@ class SceneOptions:
 
 
 def convert_file(
-    file: Path, output: Path, scene_options: SceneOptions, panorama_options: PanoramaOptions
+    file: Path,
+    output: Path,
+    scene_options: SceneOptions,
+    panorama_options: PanoramaOptions,
+    photo: Path | None = None,
 ) -> int:
     """Convert a file and return the exit code.
 
@@ -49,11 +59,11 @@ def convert_file(
         note(convert_panorama(file, output, panorama_options))
         return 0
     _refuse(panorama_options, file, kind)
-    if kind == "table" and wanted in {"scene", "graph JSON", "GraphML"}:
+    if kind == "table" and wanted in FROM_SCENE - {"table"}:
         scene = _scene_from_table(file, scene_options)
-    elif kind == "scene" and wanted in {"scene", "graph JSON", "GraphML", "table"}:
+    elif kind in {"scene", "GLB"} and wanted in FROM_SCENE:
         _refuse(replace(scene_options, name=None), file, kind)
-        scene = read_scene(file)
+        scene = read_scene(file) if kind == "scene" else read_model(file)
         if scene_options.name is not None:
             scene = replace(scene, name=scene_options.name)
         if scene.relations is None and wanted in {"graph JSON", "GraphML"}:
@@ -63,6 +73,11 @@ def convert_file(
             f"{file} to {output}: found no such conversion ({kind} to {wanted}), "
             f"expected one of\n{POSSIBLE}"
         )
+    if wanted in MODELS:
+        note(write_model(wanted, scene, output, file, photo))
+        return 0
+    if photo is not None:
+        raise InputError(f"--photo: found it with a {wanted}, expected it for .glb or .html")
     note(write_as(wanted, scene, output, file))
     return 0
 

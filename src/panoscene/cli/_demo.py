@@ -47,6 +47,12 @@ def _tell(result: DemoResult) -> None:
             ),
         ]
     )
-    for picture in (result.before_picture, result.after_picture, result.comparison):
+    for picture in (
+        result.before_picture,
+        result.after_picture,
+        result.comparison,
+        result.sheet,
+    ):
         say(f"  {picture}")
+    say(f"Open {result.report} in a browser to look around in the room.")
     say(f"The scenes and the certificate are next to them: {result.before.parent}/*.json")

@@ -28,11 +28,11 @@ def explain(text: str, arguments: Sequence[str]) -> None:
     say("\n\n".join(paragraphs).rstrip() + "\n")
 
 
-def summarised(command: Callable[..., int]) -> Callable[[], int]:
-    """Return a command without options that describes itself in one line."""
+def summarised(text: str | None) -> Callable[[], int]:
+    """Return a command without options that is described by the first line of a text."""
 
     def summary() -> int:
         return 0
 
-    summary.__doc__ = (command.__doc__ or "").partition("\n")[0]
+    summary.__doc__ = (text or "").partition("\n")[0]
     return summary

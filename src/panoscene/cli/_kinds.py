@@ -10,7 +10,18 @@ from panoscene.cli._terminal import json_text
 from panoscene.scene import Scene, relation_graph, write_box_table, write_graphml
 
 Kind = Literal[
-    "table", "scene", "graph JSON", "GraphML", "picture", "folder", "file of another kind"
+    "table",
+    "scene",
+    "graph JSON",
+    "GraphML",
+    "GLB",
+    "OBJ",
+    "SVG",
+    "DXF",
+    "page",
+    "picture",
+    "folder",
+    "file of another kind",
 ]
 
 PICTURES = {
@@ -28,6 +39,11 @@ ENDINGS: dict[Kind, str] = {
     "table": ".csv",
     "graph JSON": ".relations.json",
     "GraphML": ".graphml",
+    "GLB": ".glb",
+    "OBJ": ".obj",
+    "SVG": ".svg",
+    "DXF": ".dxf",
+    "page": ".html",
     "picture": " ".join(PICTURES),
     "folder": "a name without an ending",
 }
@@ -45,7 +61,9 @@ def kind_of(path: Path) -> Kind:
         return "picture"
     if path.is_dir() or not suffix:
         return "folder"
-    known: dict[str, Kind] = {".csv": "table", ".json": "scene", ".graphml": "GraphML"}
+    known: dict[str, Kind] = {
+        ending: kind for kind, ending in ENDINGS.items() if ending.count(".") == 1
+    }
     return known.get(suffix, "file of another kind")
 
 

@@ -18,19 +18,40 @@ from panoscene.cli._commands import (
     schema,
 )
 from panoscene.cli._errors import InputError
+from panoscene.cli._eval_commands import export, report, score
 from panoscene.cli._help import explain, summarised
 from panoscene.cli._terminal import complain
+from panoscene.cli._view_commands import draw, view
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "arrange": arrange,
     "relations": relations,
     "convert": convert,
+    "draw": draw,
+    "view": view,
     "schema": schema,
     "bench": bench,
     "experiment": experiment,
+    "eval export": export,
+    "eval score": score,
+    "eval report": report,
 }
 """Every command by its name: a function of its options that returns the exit code."""
+
+GROUPS: dict[str, str] = {
+    "eval": """\
+Write predictions, score them against the truth, and report the scores.
+
+Predictions are written once, as scene.json, and scored from disk, so that anybody can score any
+program that writes scene.json. For example:
+
+    panoscene eval export -o runs/rooms --scenes 200
+    panoscene eval score runs/rooms -o results
+    panoscene eval report results -o RESULTS.md
+""",
+}
+"""What the commands of two words have in common, by their first word."""
 
 OVERVIEW = """\
 Describe furnished rooms, derive how their objects relate, and repair their arrangement. Each
@@ -90,18 +111,37 @@ def _run(arguments: list[str]) -> int:
     if arguments[:1] == ["--version"]:
         sys.stdout.write(f"panoscene {__version__}\n")
         return 0
-    name = arguments[0] if arguments else ""
+    words = 2 if arguments and arguments[0] in GROUPS else 1
+    name = " ".join(arguments[:words])
     if name in COMMANDS:
-        command, arguments = COMMANDS[name], arguments[1:]
+        command, arguments = COMMANDS[name], arguments[words:]
         explain(command.__doc__ or "", arguments)
         program = f"panoscene {name}"
         return tyro.cli(command, prog=program, description=" ", args=arguments, config=CONFIG)
     # help, or a complaint about the arguments: ends here
-    explain(OVERVIEW, arguments)
-    overview = {name: summarised(command) for name, command in COMMANDS.items()}
+    group = arguments[0] if words > 1 else ""
+    explain(GROUPS.get(group, OVERVIEW), arguments)
     return tyro.extras.subcommand_cli_from_dict(
-        overview, prog="panoscene", args=arguments, config=CONFIG
+        _overview(group),
+        prog=f"panoscene {group}".rstrip(),
+        args=arguments[words - 1 :],
+        config=CONFIG,
     )
+
+
+def _overview(group: str) -> dict[str, Callable[[], int]]:
+    """Return what the commands of a group do in one line each; of all commands for no group."""
+    if group:
+        first = f"{group} "
+        return {
+            name.removeprefix(first): summarised(command.__doc__)
+            for name, command in COMMANDS.items()
+            if name.startswith(first)
+        }
+    return {
+        name.split()[0]: summarised(GROUPS.get(name.split()[0], command.__doc__))
+        for name, command in COMMANDS.items()
+    }
 
 
 def _is_about_input(error: ValueError) -> bool:

@@ -46,6 +46,7 @@ def export_predictions(
     targets: Sequence[Scene],
     *,
     seed: int = 0,
+    data: str = "",
     methods: Mapping[str, Method] = METHODS,
     noise: EstimateNoise | None = None,
     progress: Callable[[str], None] | None = None,
@@ -59,6 +60,7 @@ def export_predictions(
         output: folder; it is made if it does not exist.
         targets: true scenes with different names.
         seed: of the simulated estimates; estimate k depends on seed and k only.
+        data: what the targets are, for the reader of the scores.
         methods: what predicts.
         noise: how wrong the simulated estimates are.
         progress: called with a line of text before each method.
@@ -86,6 +88,7 @@ def export_predictions(
     manifest = {
         "schema": "panoscene/export",
         "version": 1,
+        "data": data,
         "scenes": len(targets),
         "seed": seed,
         "noise": asdict(noise),

@@ -9,6 +9,7 @@ from typing import Literal
 import torch
 
 from panoscene.arrange import PRESETS, arrange_scenes
+from panoscene.eval._fov import run_by_fov
 from panoscene.geometry import OrientedBoxes, direction_from_lonlat, wrap_angle
 from panoscene.scene import MEAN_SIZE, Layout, Objects, Scene, Shapes, relations_from_boxes
 
@@ -100,6 +101,23 @@ def _pairs(
     return run
 
 
+def _by_fov(estimates: Sequence[Scene], fov_deg: int) -> list[Scene]:
+    """Return scenes repaired in horizontal splits, all splits of all scenes at once."""
+    parts: list[Scene] = []
+
+    def collect(part: Scene) -> Scene:
+        parts.append(part)
+        return part
+
+    for scene in estimates:
+        run_by_fov(collect, scene, fov_deg)
+    repaired = iter(_arranged(parts, "default"))
+    return [run_by_fov(lambda _part: next(repaired), scene, fov_deg) for scene in estimates]
+
+
+FOV_DEG = (180, 120, 90, 60, 30)
+"""Horizontal splits of the paper's experiment, besides the whole panorama."""
+
 METHODS = MappingProxyType(
     {
         "estimates": Method(
@@ -129,6 +147,14 @@ METHODS = MappingProxyType(
         ),
         "true-boxes": Method("oracle", "true boxes in the estimated layout", _pairs(with_boxes_of)),
         "truth": Method("oracle", "the targets themselves", lambda targets, _: list(targets)),
+    }
+    | {
+        f"default-{fov}": Method(
+            "ours",
+            f"default, each split of {fov} degrees on its own",
+            lambda _, estimates, fov=fov: _by_fov(estimates, fov),
+        )
+        for fov in FOV_DEG
     }
 )
 """Every method by the name of its folder of predictions."""

@@ -3,11 +3,10 @@
 import os
 from collections.abc import Sequence
 
-import torch
-
 from panoscene.geometry import polygon_area
 from panoscene.scene import Scene
 from panoscene.style import BODY, FAINT_INK, MARGIN, TITLE
+from panoscene.views._curves import check_finite
 from panoscene.views._drawing import (
     dimension_shapes,
     draw_dimensions,
@@ -15,6 +14,7 @@ from panoscene.views._drawing import (
     draw_room,
     draw_scale,
 )
+from panoscene.views._far import Pointer, draw_pointer, place_pointers
 from panoscene.views._key import draw_key, key_rows
 from panoscene.views._labels import Label, place_names, place_numbers
 from panoscene.views._page import Page
@@ -46,7 +46,9 @@ def draw_birds_eye(
 
     It shows the floor with its walls and dimensions; the objects as rectangles in the colour of
     their group, with the front marked, dashed where they hang overhead; names where they fit and
-    numbers with a key where they do not; the camera, a scale and the direction of the photo's
+    numbers with a key where they do not, an object's number being its place in the scene, from 0
+    as in names such as chair_4; arrows at the border with name and distance from the room for
+    objects that are far outside; the camera, a scale and the direction of the photo's
     centre. Collisions and parts outside the room, both from one centimetre, are hatched in red;
     floors and ceilings that are pierced cannot be seen from above.
 
@@ -114,17 +116,21 @@ def draw_comparison(
         raise ValueError(f"size_px: found {size_px}, expected numbers from 1 to {LARGEST}")
     page = Page(*size_px)
     panels = make_panels(scenes, reference, relations, size_px)
-    names = [place_names(panel.plan, page.label_size) for panel in panels]
+    names = [place_names(panel.near, page.label_size) for panel in panels]
     numbers = number_objects(panels, names)
-    labels = [_place_labels(page, *parts) for parts in zip(panels, names, numbers, strict=True)]
+    pointers = [_place_pointers(page, *parts) for parts in zip(panels, numbers, strict=True)]
+    labels = [
+        _place_labels(page, *parts) for parts in zip(panels, names, numbers, pointers, strict=True)
+    ]
     for k, (panel, (title, scene)) in enumerate(zip(panels, scenes, strict=True)):
-        _draw_panel(page, panel, labels[k], reference)
+        _draw_panel(page, panel, labels[k], pointers[k], reference)
         caption = describe_room(scene) if captions is None else captions[k]
         _write_heading(page, panel, title or scene.name or "Room", caption)
     view = panels[0].view
     draw_scale(page, panels[0].left + MARGIN, MARGIN + 2, view.scale, view.turn)
     plans = [panel.plan for panel in panels]
-    rows = key_rows(plans, numbers, with_reference=reference is not None)
+    with_far = any(panel.far for panel in panels)
+    rows = key_rows(plans, numbers, with_reference=reference is not None, with_far=with_far)
     draw_key(page, rows, size_px[0] - KEY_WIDTH, size_px[1] - MARGIN, KEY_WIDTH - MARGIN)
     page.save(path)
 
@@ -138,27 +144,54 @@ def describe_room(scene: Scene) -> str:
     return f"{area:.1f} m², ceiling at {height:.2f} m, {things}"
 
 
+def _place_pointers(page: Page, panel: Panel, numbers: dict[int, str]) -> list[Pointer]:
+    return place_pointers(
+        panel.plan,
+        panel.far,
+        panel.content,
+        numbers=numbers,
+        scale=panel.view.scale,
+        measure=page.label_size,
+    )
+
+
 def _place_labels(
-    page: Page, panel: Panel, names: dict[int, Label], numbers: dict[int, str]
+    page: Page,
+    panel: Panel,
+    names: dict[int, Label],
+    numbers: dict[int, str],
+    pointers: Sequence[Pointer],
 ) -> dict[int, Label]:
     """Return the label of every object of a panel; a number wins over a name."""
     kept = {index: label for index, label in names.items() if index not in numbers}
     return kept | place_numbers(
-        panel.plan,
+        panel.near,
         kept,
         numbers,
         page.label_size,
         bounds=(panel.left + 2, FOOTER, panel.right - 2, page.height - HEADER),
-        reserved=dimension_shapes(panel.plan, panel.content),
+        reserved=[
+            *dimension_shapes(panel.plan, panel.content),
+            *(pointer.strip for pointer in pointers),
+        ],
     )
 
 
 def _draw_panel(
-    page: Page, panel: Panel, labels: dict[int, Label], reference: Scene | None
+    page: Page,
+    panel: Panel,
+    labels: dict[int, Label],
+    pointers: Sequence[Pointer],
+    reference: Scene | None,
 ) -> None:
-    page.clip((panel.left, 0.0, panel.right, float(page.height)))
+    left, low, right, high = panel.content
+    # what leaves the content leaves space for dimensions and pointers
+    page.clip((left - 4.0, low - 4.0, right + 4.0, high + 4.0))
     draw_room(page, panel.plan, reference, panel.view)
+    page.clip((panel.left, 0.0, panel.right, float(page.height)))
     draw_dimensions(page, panel.plan, panel.content, panel.view.scale)
+    for pointer in pointers:
+        draw_pointer(page, pointer)
     draw_labels(page, labels)
     page.clip(None)
 
@@ -182,12 +215,4 @@ def _check(
     if captions is not None and len(captions) != len(scenes):
         raise ValueError(f"captions: found {len(captions)}, expected {len(scenes)}")
     for scene in [scene for _, scene in scenes] + ([] if reference is None else [reference]):
-        boxes = scene.objects.boxes
-        for name, values in (
-            ("boxes.centre", boxes.centre),
-            ("boxes.size", boxes.size),
-            ("boxes.yaw", boxes.yaw),
-            ("floor_polygon", scene.layout.floor_polygon),
-        ):
-            if not bool(torch.isfinite(values).all()):
-                raise ValueError(f"{name}: found numbers that are not finite")
+        check_finite(scene)

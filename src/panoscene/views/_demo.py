@@ -1,10 +1,13 @@
 """The demonstration: disturb the sample room, repair it, and show both."""
 
 import json
+import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from torch import Tensor
 
 from panoscene.arrange import Certificate, Violations, arrange
 from panoscene.geometry import paired_box_iou
@@ -12,10 +15,17 @@ from panoscene.sample import sample_room_path
 from panoscene.scene import Scene, read_scene, write_atomically, write_scene
 from panoscene.synth import PerturbNoise, perturb_scene
 from panoscene.views._birds_eye import draw_birds_eye, draw_comparison
+from panoscene.views._default_view import default_view
+from panoscene.views._render import render_panorama, render_view
+from panoscene.views._report import write_report
+from panoscene.views._sheet import draw_sheet
+from panoscene.views._sheet_grid import SheetRow
 
 DEMO_NOISE = PerturbNoise()
 """Errors of the size that networks make: 0.02 rad in direction, 8 % in distance, 10 % in each
 size, 12 degrees in yaw, and one object in 50 turned by a quarter."""
+
+_PHOTO_HEIGHT = 768
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +42,10 @@ class DemoResult:
     after_picture: Path
     comparison: Path
     """Both pictures side by side."""
+    sheet: Path
+    """Before, after and truth: from above, on the panorama, rendered."""
+    report: Path
+    """The repaired room as a page to look around in; open it in a browser."""
     objects: int
     seed: int
     mean_iou_before: float
@@ -60,8 +74,9 @@ def run_demo(output: Path, seed: int = 0) -> DemoResult:
 
     The true boxes of the room get errors (``DEMO_NOISE``), its true relations are kept, as if a
     network had recognised them; the preset ``default`` repairs it. The folder gets
-    ``before.json``, ``after.json``, ``certificate.json``, ``before.png``, ``after.png`` and
-    ``comparison.png``; the pictures outline the true boxes in grey.
+    ``before.json``, ``after.json``, ``certificate.json``, ``before.png``, ``after.png``,
+    ``comparison.png``, ``sheet.png`` and ``report.html``; the pictures outline the true boxes in
+    grey. The room has no photo: its place takes a picture rendered from the true boxes.
 
     Args:
         output: folder for the files; it is made if it does not exist.
@@ -72,7 +87,9 @@ def run_demo(output: Path, seed: int = 0) -> DemoResult:
     """
     truth = read_scene(sample_room_path())
     disturbed = perturb_scene(truth, np.random.default_rng(seed), DEMO_NOISE)
+    start = time.perf_counter()
     arrangement = arrange(disturbed, "default")
+    seconds = time.perf_counter() - start
     certificate, repaired = arrangement.certificate, arrangement.scene
     result = _result(output, seed, truth, (disturbed, repaired), certificate)
     output.mkdir(parents=True, exist_ok=True)
@@ -91,7 +108,41 @@ def run_demo(output: Path, seed: int = 0) -> DemoResult:
         captions=[before, after],
         reference=truth,
     )
+    photo = render_panorama(truth, height=_PHOTO_HEIGHT)
+    _draw_sheet(result.sheet, photo, truth, (disturbed, repaired), (before, after))
+    write_report(
+        result.report,
+        repaired,
+        image=photo,
+        image_caption="In place of a photo: rendered from the true boxes.",
+        before=disturbed,
+        certificate=certificate,
+        timings={"arrangement": seconds},
+        title="Sample room, disturbed and repaired",
+    )
     return result
+
+
+def _draw_sheet(
+    path: Path,
+    photo: Float[Tensor, "3 height width"],
+    truth: Scene,
+    scenes: tuple[Scene, Scene],
+    captions: tuple[str, str],
+) -> None:
+    named = zip(("Disturbed", "Repaired"), scenes, captions, strict=True)
+    rows = [
+        SheetRow(
+            name,
+            scene,
+            image=photo,
+            rendering=render_panorama(scene, height=_PHOTO_HEIGHT // 2),
+            view=render_view(scene, default_view(truth)),
+            caption=caption,
+        )
+        for name, scene, caption in (*named, ("Truth", truth, ""))
+    ]
+    draw_sheet(rows, path)
 
 
 def describe_violations(violations: Violations) -> str:
@@ -131,6 +182,8 @@ def _result(
         before_picture=output / "before.png",
         after_picture=output / "after.png",
         comparison=output / "comparison.png",
+        sheet=output / "sheet.png",
+        report=output / "report.html",
         objects=len(truth.objects.boxes),
         seed=seed,
         mean_iou_before=iou[0],

@@ -14,6 +14,7 @@ from panoscene.style import (
     GROUP_COLOURS,
     INK,
     OPAQUE,
+    PAPER,
     REFERENCE,
     SMALL,
     THIN,
@@ -21,11 +22,12 @@ from panoscene.style import (
     words,
 )
 from panoscene.views._drawing import draw_alarm, draw_camera, draw_contact, draw_front, draw_piece
+from panoscene.views._far import draw_arrow_head
 from panoscene.views._page import Page
 from panoscene.views._pieces import Contact, Piece, Plan
 
 Mark = Literal[
-    "front", "overhead", "contact", "collision", "outside", "both", "reference", "camera"
+    "front", "overhead", "contact", "collision", "outside", "both", "far", "reference", "camera"
 ]
 _MARKS: dict[Mark, str] = {
     "front": "front",
@@ -34,6 +36,7 @@ _MARKS: dict[Mark, str] = {
     "collision": "collision",
     "outside": "outside the room",
     "both": "collides, or outside",
+    "far": "far away, distance",
     "reference": "true place",
     "camera": "camera",
 }
@@ -43,6 +46,8 @@ _STEP = 23.0
 """Pixels from row to row."""
 _WEIGHT = {"group": 1.25, "number": 1.0, "mark": 1.2, "space": 0.7}
 """Height of the kinds of rows in steps."""
+_LINE = 9
+"""Characters of numbers in a row."""
 FOOT = 24.0
 """Pixels that stay free below the key."""
 
@@ -58,7 +63,11 @@ class Row:
 
 
 def key_rows(
-    plans: Sequence[Plan], numbers: Sequence[dict[int, str]], *, with_reference: bool
+    plans: Sequence[Plan],
+    numbers: Sequence[dict[int, str]],
+    *,
+    with_reference: bool,
+    with_far: bool = False,
 ) -> list[Row]:
     """Return the rows for what the plans show, and no others."""
     shown: dict[str, dict[str, set[int]]] = {group: {} for group in GROUP_COLOURS}
@@ -72,11 +81,8 @@ def key_rows(
         if not categories:
             continue
         rows.append(Row("group", group.capitalize()))
-        rows += [
-            Row("number", words(category), number_ranges(members))
-            for category, members in sorted(categories.items())
-            if members
-        ]
+        for category, members in sorted(categories.items()):
+            rows += number_rows(category, members)
     pieces = [piece for plan in plans for piece in plan.pieces]
     collides = any(plan.clashes for plan in plans)
     leaves = any(piece.outside.area > 0 for piece in pieces)
@@ -87,6 +93,7 @@ def key_rows(
         "collision": collides and not leaves,
         "outside": leaves and not collides,
         "both": collides and leaves,
+        "far": with_far,
         "reference": with_reference,
         "camera": True,
     }
@@ -95,11 +102,25 @@ def key_rows(
     return rows + [Row("mark", mark) for mark in _MARKS if present[mark]]
 
 
+def number_rows(category: str, numbers: set[int]) -> list[Row]:
+    """Return the rows that say which objects are of a category; long lists take several rows."""
+    lines: list[str] = []
+    for part in number_ranges(numbers).split(", ") if numbers else []:
+        if lines and len(lines[-1]) + len(part) <= _LINE:
+            lines[-1] += f", {part}"
+        else:
+            lines.append(part)
+    return [Row("number", "" if k else words(category), line) for k, line in enumerate(lines)]
+
+
 def longest_key(categories: Sequence[int]) -> float:
-    """Return the height in pixels of a key in which every category has a row."""
-    names = {CATEGORIES[category] for category in categories}
-    groups = {group_of(name) for name in names}
-    rows = _WEIGHT["group"] * len(groups) + len(names) + _WEIGHT["mark"] * (len(_MARKS) - 2)
+    """Return the height in pixels of a key in which every object of a scene has its number."""
+    numbers: dict[str, set[int]] = {}
+    for index, category in enumerate(categories):
+        numbers.setdefault(CATEGORIES[category], set()).add(index)
+    lines = sum(len(number_rows(name, members)) for name, members in numbers.items())
+    groups = {group_of(name) for name in numbers}
+    rows = _WEIGHT["group"] * len(groups) + lines + _WEIGHT["mark"] * (len(_MARKS) - 3)
     return _STEP * (rows + _WEIGHT["space"]) + 2 * FOOT
 
 
@@ -143,6 +164,8 @@ def draw_key(page: Page, rows: Sequence[Row], x: float, top: float, width: float
             size = SMALL * shrink
             page.text(x + indent, middle, row.number, size=size, colour=INK, bold=True)
             left = indent + number_width + 10
+            if page.text_size(row.text, size)[0] > width - left:  # rather out of line than cut
+                left = indent + page.text_size(row.number, size, bold=True)[0] + 10
             text = page.fitted(row.text, size, width - left)
             page.text(x + left, middle, text, size=size, colour=FAINT_INK)
         elif row.kind == "mark":
@@ -158,6 +181,8 @@ def _draw_mark(page: Page, mark: str, x: float, y: float) -> None:
         draw_contact(page, Contact(np.array([x + 2, y]), np.array([x + 18, y])))
     elif mark == "camera":
         draw_camera(page, middle)
+    elif mark == "far":
+        draw_arrow_head(page, (x + 10, y), (1.0, 0.0), PAPER)
     elif mark == "reference":
         page.area(
             shapely.box(x, y - 7, x + 20, y + 7), edge=REFERENCE, width=1.2, dashes=(4.0, 2.5)

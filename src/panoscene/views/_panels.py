@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from panoscene.scene import Scene
-from panoscene.style import group_of
+from panoscene.views._far import far_objects
 from panoscene.views._key import longest_key
 from panoscene.views._labels import Label
 from panoscene.views._pieces import Bounds, Plan, View, make_plan, room_turn, scene_bounds
@@ -30,6 +30,14 @@ class Panel:
     plan: Plan
     content: Bounds
     """What room and objects take, in pixels; at the same place in every panel."""
+    far: frozenset[int]
+    """Objects outside of what is shown."""
+
+    @property
+    def near(self) -> Plan:
+        """The plan without the objects outside of what is shown."""
+        pieces = tuple(piece for piece in self.plan.pieces if piece.index not in self.far)
+        return replace(self.plan, pieces=pieces)
 
 
 def make_panels(
@@ -45,7 +53,7 @@ def make_panels(
     if min(free) < 50:
         raise ValueError(f"size_px: found {size_px}, too small for {len(scenes)} picture(s)")
     shown = [scene for _, scene in scenes] + ([] if reference is None else [reference])
-    turn, scale, (low_x, low_y, high_x, high_y) = _fit(shown, free)
+    turn, scale, (low_x, low_y, high_x, high_y) = fit_rooms(shown, free)
     panels = []
     for k, (_, scene) in enumerate(scenes):
         middle = (k + 0.5) * width, FOOTER + height / 2
@@ -54,7 +62,11 @@ def make_panels(
         view = View(turn, scale, offset)
         plan = make_plan(scene, view, relations=relations)
         content = middle[0] - x, middle[1] - y, middle[0] + x, middle[1] + y
-        panels.append(Panel(k * width, (k + 1) * width, view, plan, content))
+        far = far_objects(plan, content)
+        # the line to an object out of sight would cross the room
+        near = tuple(contact for contact in plan.contacts if far.isdisjoint(contact.objects))
+        plan = replace(plan, contacts=near)
+        panels.append(Panel(k * width, (k + 1) * width, view, plan, content, far))
     return panels
 
 
@@ -67,14 +79,14 @@ def _free(size_px: tuple[int, int], count: int) -> tuple[float, float]:
 def natural_size(scenes: Sequence[Scene], reference: Scene | None, width: int) -> tuple[int, int]:
     """Return the size of a page without empty strips above and below rooms and key."""
     shown = [*scenes, *([] if reference is None else [reference])]
-    _, scale, (_, low, _, high) = _fit(shown, _free((width, HIGHEST), len(scenes)))
+    _, scale, (_, low, _, high) = fit_rooms(shown, _free((width, HIGHEST), len(scenes)))
     rooms = HEADER + FOOTER + 2 * AROUND + scale * (high - low)
-    key = longest_key([int(k) for scene in scenes for k in scene.objects.category])
+    key = max(longest_key([int(k) for k in scene.objects.category]) for scene in scenes)
     return width, int(min(max(rooms, key, LOWEST), HIGHEST))
 
 
-def _fit(scenes: list[Scene], free: tuple[float, float]) -> tuple[float, float, Bounds]:
-    """Return turn, scale and bounds of the room.
+def fit_rooms(scenes: Sequence[Scene], free: tuple[float, float]) -> tuple[float, float, Bounds]:
+    """Return turn, scale and bounds of the room that fit into this many pixels.
 
     +y points up as far as the walls allow, unless another quarter turn makes the room clearly
     larger.
@@ -91,20 +103,16 @@ def _fit(scenes: list[Scene], free: tuple[float, float]) -> tuple[float, float, 
 def number_objects(panels: list[Panel], names: list[dict[int, Label]]) -> list[dict[int, str]]:
     """Return the number of each object that has no name in one of the panels, for each panel.
 
-    Numbers count through groups and categories, so that the key can say "3-6 chair"; the object
-    of the same index and category has the same number everywhere.
+    The number of an object is its place in the scene, from 0 as in names such as chair_4, so it
+    is the same in all pictures of a scene.
     """
-    nameless: dict[tuple[str, str, int], None] = {}
-    for panel, named in zip(panels, names, strict=True):
-        for piece in panel.plan.pieces:
-            if piece.index not in named:
-                nameless[group_of(piece.category), piece.category, piece.index] = None
-    number = {key: str(k) for k, key in enumerate(sorted(nameless), start=1)}
+    nameless = {
+        piece.index
+        for panel, named in zip(panels, names, strict=True)
+        for piece in panel.near.pieces
+        if piece.index not in named
+    }
     return [
-        {
-            piece.index: number[key]
-            for piece in panel.plan.pieces
-            if (key := (group_of(piece.category), piece.category, piece.index)) in number
-        }
+        {piece.index: str(piece.index) for piece in panel.plan.pieces if piece.index in nameless}
         for panel in panels
     ]

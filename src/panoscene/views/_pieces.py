@@ -1,7 +1,7 @@
 """A scene as shapes on the page: footprints, fronts, collisions, parts outside, contacts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -15,7 +15,8 @@ from panoscene.style import MOST_WALL, NO_FRONT, OVERHEAD, WALL_THICKNESS
 TOLERANCE = 0.01
 """Metres of penetration, or of sticking out of the room, from which it is shown."""
 FAR = 2.0
-"""Metres outside the room from which an object may lie outside the picture."""
+"""Metres outside the room from which an object may lie outside the picture, and length from which
+no line is drawn between two that should touch: it would cross what has nothing to do with it."""
 Bounds = tuple[float, float, float, float]
 
 
@@ -79,6 +80,8 @@ class Contact:
 
     start: Float[np.ndarray, " 2"]
     end: Float[np.ndarray, " 2"]
+    objects: tuple[int, ...] = ()
+    """The one or two that touch."""
 
     @property
     def shape(self) -> shapely.Geometry:
@@ -145,7 +148,7 @@ def make_plan(scene: Scene, view: View, *, relations: bool) -> Plan:
     thickness = min(WALL_THICKNESS * view.scale, MOST_WALL)
     corners = view.page(_footprints(boxes))
     footprints = [shapely.Polygon(corner) for corner in corners]
-    pairs = _colliding_pairs(boxes)
+    pairs = colliding_pairs(boxes)
     colliding = set(pairs.flatten().tolist())
     grown = floor.buffer(TOLERANCE * view.scale, join_style="mitre")
     bottom = (boxes.centre[:, 2] - boxes.size[:, 2] / 2 - scene.layout.floor_height).tolist()
@@ -169,7 +172,11 @@ def make_plan(scene: Scene, view: View, *, relations: bool) -> Plan:
         walls=floor.buffer(thickness, join_style="mitre").difference(floor),
         pieces=tuple(pieces),
         clashes=tuple(clashes),
-        contacts=tuple(_contacts(scene, footprints, view)) if relations else (),
+        contacts=tuple(
+            contact
+            for contact in (_contacts(scene, footprints, view) if relations else ())
+            if np.linalg.norm(contact.end - contact.start) < FAR * view.scale
+        ),
         camera=view.page(np.zeros(2)),
         thinner=min(1.0, max(0.6, view.scale / 95.0)),
     )
@@ -179,7 +186,8 @@ def _footprints(boxes: OrientedBoxes) -> Float[np.ndarray, "n 4 2"]:
     return box_footprint(boxes).double().numpy(force=True)
 
 
-def _colliding_pairs(boxes: OrientedBoxes) -> Int64[np.ndarray, "pairs 2"]:
+def colliding_pairs(boxes: OrientedBoxes) -> Int64[np.ndarray, "pairs 2"]:
+    """Return the pairs of objects that overlap by more than a centimetre."""
     depth = penetration_depth(boxes[:, None], boxes[None, :]).triu(diagonal=1)
     return (depth > TOLERANCE).nonzero().numpy(force=True)
 
@@ -200,14 +208,16 @@ def _contacts(scene: Scene, footprints: list[shapely.Polygon], view: View) -> li
             scene.objects.boxes, scene.layout, scene.panorama.camera_height
         )
     contacts = [
-        _object_contact(footprints[a], footprints[b]) for a, b in _touching_pairs(relations)
+        replace(_object_contact(footprints[a], footprints[b]), objects=(a, b))
+        for a, b in _touching_pairs(relations)
     ]
     polygon = scene.layout.floor_polygon
     corners = view.page(polygon.double().numpy(force=True))
     normals = View(view.turn).page(wall_normals(polygon).double().numpy(force=True))
     for index, wall in (relations.touching_wall >= 0.5).nonzero().tolist():
         ends = corners[wall], corners[(wall + 1) % len(corners)]
-        contacts.append(_wall_contact(footprints[index], *ends, normals[wall]))
+        contact = _wall_contact(footprints[index], *ends, normals[wall])
+        contacts.append(replace(contact, objects=(index,)))
     return contacts
 
 
@@ -230,7 +240,10 @@ def _object_contact(a: shapely.Polygon, b: shapely.Polygon) -> Contact:
         return Contact(place, place)
     gap = a.distance(b)
     reach = gap / 2 + 3.0
-    middle = np.array(a.buffer(reach).intersection(b.buffer(reach)).centroid.coords[0])
+    shared = a.buffer(reach).intersection(b.buffer(reach))
+    if shared.is_empty:  # so far apart that the corners of rounded outlines do not meet
+        shared = shapely.shortest_line(a, b)
+    middle = np.array(shared.centroid.coords[0])
     direction = _facing_axis(a, b)
     half = gap / 2 + 7.0
     return Contact(middle - half * direction, middle + half * direction)

@@ -1,0 +1,153 @@
+"""Predictions to disk, scores from disk, tables from scores."""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from panoscene.cli._errors import InputError
+from panoscene.cli._files import blaming, check_folder, scene_files, write_text
+from panoscene.cli._progress import progress_bar, progress_words
+from panoscene.cli._terminal import note, say, say_json
+from panoscene.eval import (
+    MANIFEST,
+    METHODS,
+    PREDICTIONS,
+    SUMMARY,
+    TARGETS,
+    ScoreFile,
+    export_predictions,
+    read_scores,
+    results_page,
+    sample_targets,
+    score_folder,
+    score_table,
+    summary_table,
+    write_scores,
+)
+from panoscene.eval import replace_between as between
+from panoscene.scene import Scene, read_scene
+
+Job = tuple[Path, dict[str, str], Path]
+"""A folder of predictions, what is known of it, and the folder of its targets."""
+
+
+def run_export(
+    output: Path, targets: str | None, methods: str | None, *, scenes: int, seed: int
+) -> int:
+    """Write targets and predictions and return the exit code."""
+    if scenes < 1 or seed < 0:
+        raise InputError(f"--scenes {scenes} --seed {seed}: expected at least 1 and 0")
+    check_folder(output)
+    names = list(METHODS) if methods is None else methods.split(",")
+    for name in names:
+        if name not in METHODS:
+            raise InputError(f"--methods: found {name!r}, expected some of {', '.join(METHODS)}")
+    rooms = sample_targets(scenes, seed) if targets is None else _named(scene_files([targets]))
+    with progress_words() as progress, blaming("--output"):
+        done = export_predictions(
+            output,
+            rooms,
+            seed=seed,
+            data=f"sampled rooms, seed {seed}" if targets is None else targets,
+            methods={name: METHODS[name] for name in names},
+            progress=progress,
+        )
+    note(f"wrote {output}: {len(rooms)} targets and the predictions of {', '.join(done)}")
+    return 0
+
+
+def run_score(
+    source: Path,
+    targets: Path | None,
+    output: Path | None,
+    *,
+    shapes: bool,
+    replicates: int,
+    workers: int | None,
+    as_json: bool,
+) -> int:
+    """Score an export, or one folder of predictions, and return the exit code."""
+    if replicates < 0 or (workers is not None and workers < 1):
+        raise InputError("--replicates, --workers: expected at least 0 and 1")
+    if not source.is_dir():
+        raise InputError(f"{source}: found no folder there, expected predictions or an export")
+    if output is not None:
+        check_folder(output)
+    jobs, data = _jobs(source, targets)
+    results: list[ScoreFile] = []
+    count = sum(len(list(job[2].glob("*.json"))) for job in jobs)
+    with progress_bar("scoring", count) as advance:
+        for folder, facts, truth in jobs:
+            score = score_folder(
+                folder,
+                truth,
+                method=folder.name,
+                kind=facts.get("kind", "prediction"),
+                description=facts.get("description", ""),
+                data=data,
+                shapes=shapes,
+                replicates=replicates,
+                workers=workers or os.cpu_count() or 1,
+                progress=advance,
+            )
+            results.append(score)
+            if output is not None:
+                output.mkdir(parents=True, exist_ok=True)
+                write_scores(score, output / f"{score.method}.json")
+    if output is not None:
+        note(f"wrote {output}: the scores of {', '.join(score.method for score in results)}")
+    if as_json:
+        say_json([score.model_dump(by_alias=True) for score in results])
+    else:
+        say(score_table(results, SUMMARY))
+    return 0
+
+
+def run_report(source: Path, output: Path, readme: Path | None, *, check: bool) -> int:
+    """Write or check the pages of results and return the exit code."""
+    files = sorted(source.glob("*.json")) if source.is_dir() else [source]
+    if not files:
+        raise InputError(f"{source}: found no files of scores, expected those of eval score")
+    order = {name: place for place, name in enumerate(METHODS)}
+    scores = sorted(map(read_scores, files), key=lambda s: order.get(s.method, len(order)))
+    with blaming(source):
+        texts = {output: results_page(scores)}
+        if readme is not None:
+            texts[readme] = between(readme.read_text(), "results", summary_table(scores))
+    stale = [path for path, text in texts.items() if not path.exists() or path.read_text() != text]
+    if check:
+        if stale:
+            names = ", ".join(map(str, stale))
+            raise InputError(
+                f"{names}: found other tables than {source} gives; run without --check"
+            )
+        note(f"{', '.join(map(str, texts))}: up to date")
+        return 0
+    for path in stale:
+        write_text(path, texts[path])
+    note(f"wrote {', '.join(map(str, stale))}" if stale else "nothing has changed")
+    return 0
+
+
+def _jobs(
+    source: Path, targets: Path | None
+) -> tuple[list[tuple[Path, dict[str, str], Path]], str]:
+    """Return each folder of predictions with what is known of it, and its targets."""
+    manifest = source / MANIFEST
+    if targets is not None or not manifest.exists():
+        if targets is None:
+            expected = "--targets FOLDER with the true scenes, or a folder made by eval export"
+            raise InputError(f"{source}: found predictions alone, expected {expected}")
+        return [(source, {}, targets)], str(targets)
+    facts = json.loads(manifest.read_text())
+    jobs = [
+        (source / PREDICTIONS / name, known, source / TARGETS)
+        for name, known in facts["methods"].items()
+    ]
+    return jobs, facts["data"]
+
+
+def _named(files: list[Path]) -> list[Scene]:
+    """Return scenes under the names of their files."""
+    return [replace(read_scene(file), name=file.stem) for file in files]

@@ -1,0 +1,81 @@
+"""The file of scores: what was measured on one folder of predictions, with intervals."""
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from panoscene.scene import Problem, SceneFormatError, write_atomically
+
+SCORE_SCHEMA, SCORE_VERSION = "panoscene/score", 1
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, populate_by_name=True
+    )
+
+
+class Measured(_Model):
+    """One number with its 95 % interval over scenes; None where it is not defined."""
+
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+
+
+class ScoreFile(_Model):
+    """All scores of one method on one set of targets."""
+
+    schema_name: Literal["panoscene/score"] = Field(default=SCORE_SCHEMA, alias="schema")
+    version: Literal[1] = SCORE_VERSION
+    panoscene: str
+    """Version of the package that scored."""
+    method: str
+    kind: str
+    """ours, released, input, baseline, oracle, or prediction for anybody's folder."""
+    description: str
+    data: str
+    """What the targets are."""
+    scenes: Annotated[int, Field(ge=0)]
+    objects: Annotated[int, Field(ge=0)]
+    """Target objects."""
+    missing: Annotated[int, Field(ge=0)]
+    """Scenes without a prediction; they count as empty, never as absent."""
+    targets_hash: str
+    """First 16 hexadecimal digits of the SHA-256 of all target files."""
+    predictions_hash: str
+    replicates: Annotated[int, Field(ge=0)]
+    """Bootstrap resamples behind the intervals."""
+    seed: int
+    metrics: dict[str, Measured]
+    """By dotted names, such as ``detection.ap_15_mean_57``."""
+    categories: dict[str, dict[str, Measured]]
+    """Per category; categories without targets and predictions are left out."""
+
+
+def write_scores(scores: ScoreFile, path: str | os.PathLike[str]) -> None:
+    """Write a file of scores; it appears complete or not at all."""
+    text = json.dumps(scores.model_dump(by_alias=True), indent=1)
+    write_atomically(Path(path), text + "\n")
+
+
+def read_scores(path: str | os.PathLike[str]) -> ScoreFile:
+    """Return the scores in a file.
+
+    Raises:
+        SceneFormatError: the file is not a file of scores of this version.
+        OSError: it cannot be read.
+    """
+    try:
+        return ScoreFile.model_validate_json(Path(path).read_bytes())
+    except ValidationError as error:
+        problems = [
+            Problem(
+                ".".join(map(str, detail["loc"])) or "$", repr(detail["input"])[:60], detail["msg"]
+            )
+            for detail in error.errors(include_url=False)[:5]
+        ]
+        raise SceneFormatError(os.fspath(path), problems) from None

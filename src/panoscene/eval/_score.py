@@ -1,0 +1,129 @@
+"""Scores of predictions on disk: every target counts, and each scene is measured once."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import torch
+
+from panoscene import __version__
+from panoscene.eval._pooling import RECALL_LEVELS, pooled_categories, pooled_metrics
+from panoscene.eval._results import ScoreFile
+from panoscene.eval._scene_records import SceneRecords, records_at_recall, scene_records
+from panoscene.scene import Problem, SceneFormatError, read_scene
+
+_CHUNK = 32
+"""Scenes that a process measures at a time."""
+_WORTH_PROCESSES = 128
+"""Fewer scenes are done before another process has loaded the libraries."""
+
+
+def score_folder(
+    predictions: Path,
+    targets: Path,
+    *,
+    method: str = "",
+    kind: str = "prediction",
+    description: str = "",
+    data: str = "",
+    shapes: bool = False,
+    replicates: int = 400,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Callable[[int], None] | None = None,
+) -> ScoreFile:
+    """Return the scores of a folder of predictions against a folder of targets.
+
+    A prediction belongs to the target with the same file name. A target without a prediction
+    counts as an empty room with the worst layout; a prediction without a target is an error.
+
+    Args:
+        predictions: folder of scene.json files.
+        targets: folder of scene.json files.
+        method: name of the row in tables; that of the folder when empty.
+        kind: as in ``METHODS``.
+        description: one line about the method.
+        data: what the targets are.
+        shapes: also compare meshes, where the targets have them; slower.
+        replicates: bootstrap resamples of the scenes for the 95 % intervals.
+        seed: of the resampling.
+        workers: processes that measure scenes.
+        progress: called with the number of scenes done.
+
+    Raises:
+        SceneFormatError: a file is not a scene, or a prediction has no target.
+        OSError: a folder or file cannot be read.
+    """
+    names = _names(predictions, targets)
+    jobs = [
+        (predictions, targets, names[first : first + _CHUNK], shapes)
+        for first in range(0, len(names), _CHUNK)
+    ]
+    records: list[SceneRecords] = []
+    tell = progress or (lambda _count: None)
+    if workers > 1 and len(names) >= _WORTH_PROCESSES:
+        context = get_context("spawn")
+        with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
+            for part in pool.map(_measure, jobs):
+                records += part
+                tell(len(part))
+    else:
+        for part in map(_measure, jobs):
+            records += part
+            tell(len(part))
+    at_recall = {level: records_at_recall(records, level) for level in RECALL_LEVELS}
+    return ScoreFile(
+        panoscene=__version__,
+        method=method or predictions.name,
+        kind=kind,
+        description=description,
+        data=data,
+        scenes=len(records),
+        objects=sum(record.targets for record in records),
+        missing=sum(record.missing for record in records),
+        targets_hash=_hash(targets, names),
+        predictions_hash=_hash(predictions, names),
+        replicates=replicates,
+        seed=seed,
+        metrics=pooled_metrics(records, at_recall, replicates=replicates, seed=seed),
+        categories=pooled_categories(records),
+    )
+
+
+def _names(predictions: Path, targets: Path) -> list[str]:
+    wanted = sorted(path.name for path in targets.glob("*.json"))
+    found = {path.name for path in predictions.glob("*.json")}
+    problems = []
+    if not wanted:
+        problems.append(Problem(str(targets), "no scene files", "targets as scene.json files"))
+    if extra := sorted(found - set(wanted)):
+        expected = f"only names of targets in {targets}"
+        problems.append(Problem("files", ", ".join(extra[:5]), expected))
+    if problems:
+        raise SceneFormatError(predictions, problems)
+    return wanted
+
+
+def _measure(job: tuple[Path, Path, list[str], bool]) -> list[SceneRecords]:
+    predictions, targets, names, shapes = job
+    threads = torch.get_num_threads()
+    # tensors this small are slower with more threads, and processes already share the cores
+    torch.set_num_threads(1)
+    try:
+        true = [read_scene(targets / name) for name in names]
+        paths = [predictions / name for name in names]
+        found = [read_scene(path) if path.exists() else None for path in paths]
+        return scene_records(found, true, shapes=shapes)
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _hash(folder: Path, names: Sequence[str]) -> str:
+    digest = hashlib.sha256()
+    for name in names:
+        path = folder / name
+        digest.update(f"{name}\0".encode())
+        digest.update(path.read_bytes() if path.exists() else b"")
+    return digest.hexdigest()[:16]

@@ -1,0 +1,93 @@
+"""A good place to look into a room from."""
+
+import math
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from panoscene.geometry import box_corners, direction_from_lonlat
+from panoscene.scene import Scene
+from panoscene.views._cameras import FreeCamera, fitting_camera, free_lens
+from panoscene.views._model import build_model
+
+_FOV_DEG = 34.0
+_LOOK_DOWN_DEG = 38.0
+_AROUND = 12
+"""Directions that are tried."""
+_COLUMNS = 80
+"""Of the small pictures that tell which direction shows most."""
+_CORNER = 0.2
+"""How much more a view from a corner is worth than one along the walls."""
+_FAR = 2.0
+"""Metres outside the room from which an object need not be in the picture."""
+
+
+def default_view(
+    scene: Scene, *, size_px: tuple[int, int] = (1024, 768), look_down_deg: float = _LOOK_DOWN_DEG
+) -> FreeCamera:
+    """Return a camera high outside the room that shows most of its objects and their fronts.
+
+    All of the room is in the picture, and all objects but those more than 2 m outside. Of twelve
+    directions around it takes the one in which the objects hide each other least.
+
+    Args:
+        scene: what to look at.
+        size_px: width and height of the picture to come.
+        look_down_deg: how far below the horizon it looks, in degrees.
+
+    Raises:
+        ValueError: as ``render_view``, or a look down that is not within 90 degrees.
+    """
+    if not -90 <= look_down_deg <= 90:
+        raise ValueError(f"look_down_deg: found {look_down_deg}, expected -90 to 90 degrees")
+    points = _extent(scene)
+    lat, turn = -math.radians(look_down_deg), wall_angle(scene)
+    best, most = None, -1.0
+    for lon in (np.arange(_AROUND) + 0.37) * (2 * math.pi / _AROUND):
+        ahead = direction_from_lonlat(torch.tensor([lon, lat], dtype=torch.float64))
+        camera = fitting_camera(ahead, points, _FOV_DEG, size_px)
+        worth = _worth(scene, camera, size_px) * (1 + _CORNER * abs(math.sin(2 * (lon + turn))))
+        if worth > most:
+            best, most = camera, worth
+    if best is None:
+        raise ValueError("size_px: found no camera for a picture of that size")
+    return best
+
+
+def wall_angle(scene: Scene) -> float:
+    """Return the direction along most of the walls, from +x, within 45 degrees, in radians."""
+    polygon = scene.layout.floor_polygon.double().numpy(force=True)
+    wall = np.roll(polygon, -1, axis=0) - polygon
+    angle, length = np.arctan2(wall[:, 1], wall[:, 0]), np.hypot(wall[:, 0], wall[:, 1])
+    across, along = (length * np.sin(4 * angle)).sum(), (length * np.cos(4 * angle)).sum()
+    return float(np.arctan2(across, along) / 4)
+
+
+def _extent(scene: Scene) -> Float[np.ndarray, "points 3"]:
+    """Return the corners that have to be in the picture."""
+    layout = scene.layout
+    polygon = layout.floor_polygon.double().numpy(force=True)
+    heights = (layout.floor_height, layout.ceiling_height)
+    room = np.concatenate([np.column_stack([polygon, np.full(len(polygon), z)]) for z in heights])
+    corners = box_corners(scene.objects.boxes).double().numpy(force=True).reshape(-1, 3)
+    low, high = room.min(0) - _FAR, room.max(0) + _FAR
+    return np.concatenate([room, corners[((corners >= low) & (corners <= high)).all(-1)]])
+
+
+def _worth(scene: Scene, camera: FreeCamera, size_px: tuple[int, int]) -> float:
+    """Return how much a camera shows of the objects: what is seen of each, and fronts twice."""
+    columns = _COLUMNS
+    rows = max(1, round(columns * size_px[1] / size_px[0]))
+    lens = free_lens(camera, (columns, rows))
+    model = build_model(scene, lens.eye, cut=False)
+    v, u = np.meshgrid(np.arange(rows) + 0.5, np.arange(columns) + 0.5, indexing="ij")
+    rays = lens.directions(u.ravel(), v.ravel()).astype(np.float32)
+    eye = np.ascontiguousarray(np.broadcast_to(lens.eye.astype(np.float32), rays.shape))
+    face = model.caster.first(eye, rays)
+    face = face[face >= 0]
+    face = face[model.item[face] >= 0]
+    weight = np.where(model.mark[face] < 0, 2.0, 1.0)
+    pixels = np.bincount(model.item[face], weight, minlength=1)
+    # a large object counts for less than several small ones of the same size together
+    return float(np.sqrt(pixels).sum())

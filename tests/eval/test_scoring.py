@@ -1,0 +1,170 @@
+"""Predictions to disk, scores from disk, pages from scores."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from panoscene.cli import main
+from panoscene.eval import (
+    METHODS,
+    Measured,
+    export_predictions,
+    read_scores,
+    results_page,
+    sample_targets,
+    score_folder,
+    summary_table,
+    write_scores,
+)
+from panoscene.scene import SceneFormatError, read_scene
+
+CHOSEN = ("estimates", "default", "mean-box", "truth", "default-180")
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return an export of three sampled rooms."""
+    output = tmp_path_factory.mktemp("export")
+    methods = {name: METHODS[name] for name in CHOSEN}
+    export_predictions(output, sample_targets(3, 11), seed=11, methods=methods, data="three rooms")
+    return output
+
+
+def test_an_export_holds_targets_predictions_and_how_they_were_made(export: Path) -> None:
+    facts = json.loads((export / "export.json").read_text())
+    assert facts["scenes"] == 3
+    assert set(facts["methods"]) == set(CHOSEN)
+    for name in CHOSEN:
+        for target in (export / "targets").glob("*.json"):
+            prediction = read_scene(export / "predictions" / name / target.name)
+            assert prediction.name == target.stem
+
+
+def test_targets_do_not_depend_on_their_number() -> None:
+    few, more = sample_targets(1, 3), sample_targets(2, 3)
+    assert few[0].objects.boxes.centre.equal(more[0].objects.boxes.centre)
+
+
+def test_the_truth_is_perfect_and_the_trivial_baseline_is_not(export: Path) -> None:
+    truth = score_folder(export / "predictions" / "truth", export / "targets", replicates=0)
+    trivial = score_folder(export / "predictions" / "mean-box", export / "targets", replicates=0)
+    for name in (
+        "detection.ap_50_mean_57",
+        "detection.recall_50",
+        "layout.regularised.overall.iou_3d",
+        "semantic.mean",
+    ):
+        assert truth.metrics[name].value == pytest.approx(1.0, abs=1e-6), name
+        value = trivial.metrics[name].value
+        assert value is None or value < 0.9, name
+    assert truth.metrics["plausibility.paper_colliding_pairs"].value == 0
+
+
+def test_a_missing_prediction_counts_as_an_empty_room(export: Path, tmp_path: Path) -> None:
+    names = sorted(path.name for path in (export / "targets").glob("*.json"))
+    for name in names[1:]:
+        (tmp_path / name).write_bytes((export / "predictions" / "truth" / name).read_bytes())
+    score = score_folder(tmp_path, export / "targets", replicates=0)
+    counts = [len(read_scene(export / "targets" / name).objects.boxes) for name in names]
+    assert (score.scenes, score.missing) == (3, 1)
+    recall = score.metrics["detection.recall_15"].value
+    assert recall == pytest.approx(sum(counts[1:]) / sum(counts))
+    iou = score.metrics["layout.regularised.overall.iou_2d"].value
+    assert iou == pytest.approx(2 / 3, abs=1e-6)
+    assert score.metrics["layout.regularised.overall.degenerate"].value == 1
+
+
+def test_a_prediction_without_a_target_is_refused(export: Path, tmp_path: Path) -> None:
+    target = next((export / "targets").glob("*.json"))
+    (tmp_path / "other.json").write_bytes(target.read_bytes())
+    with pytest.raises(SceneFormatError, match=r"other\.json"):
+        score_folder(tmp_path, export / "targets")
+
+
+def test_a_prediction_without_relations_has_no_relation_scores(
+    export: Path, tmp_path: Path
+) -> None:
+    for path in (export / "predictions" / "estimates").glob("*.json"):
+        document = json.loads(path.read_text())
+        del document["relations"]
+        (tmp_path / path.name).write_text(json.dumps(document))
+    score = score_folder(tmp_path, export / "targets", replicates=0)
+    assert not [name for name in score.metrics if name.startswith("relations.")]
+    assert "fidelity.touching_f1" in score.metrics
+
+
+def test_intervals_hold_their_value_and_are_reproducible(export: Path) -> None:
+    folder = export / "predictions" / "estimates"
+    first, second = (
+        score_folder(folder, export / "targets", replicates=20, seed=4) for _ in range(2)
+    )
+    assert first == second
+    measured = first.metrics["layout.regularised.overall.iou_2d"]
+    assert measured.value is not None
+    assert measured.low is not None
+    assert measured.high is not None
+    assert measured.low <= measured.value <= measured.high
+
+
+def test_the_commands_write_results_and_notice_stale_pages(
+    export: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results, page, readme = tmp_path / "results", tmp_path / "RESULTS.md", tmp_path / "README.md"
+    readme.write_text("before\n<!-- results:begin -->\n<!-- results:end -->\nafter\n")
+    arguments = ["eval", "score", str(export), "-o", str(results), "--replicates", "0"]
+    assert main([*arguments, "--workers", "1"]) == 0
+    assert {path.stem for path in results.glob("*.json")} == set(CHOSEN)
+    report = ["eval", "report", str(results), "-o", str(page), "--readme", str(readme)]
+    assert main([*report, "--check"]) == 2
+    assert not page.exists()
+    assert main(report) == 0
+    assert main([*report, "--check"]) == 0
+    assert "three rooms" in page.read_text()
+    assert readme.read_text().startswith("before\n<!-- results:begin -->\n| method |")
+    assert "`default-180`" not in summary_table([read_scores(p) for p in results.glob("*.json")])
+    readme.write_text(readme.read_text().replace("`truth`", "`lies`"))
+    capsys.readouterr()
+    assert main([*report, "--check"]) == 2
+    assert "README.md" in capsys.readouterr().err
+
+
+def test_scores_on_other_targets_do_not_share_a_table(export: Path) -> None:
+    score = score_folder(export / "predictions" / "truth", export / "targets", replicates=0)
+    other = score.model_copy(update={"targets_hash": "0" * 16})
+    with pytest.raises(ValueError, match="other targets"):
+        results_page([score, other])
+    with pytest.raises(ValueError, match="no files"):
+        results_page([])
+
+
+def test_files_of_scores_come_back_and_bad_ones_are_named(export: Path, tmp_path: Path) -> None:
+    score = score_folder(export / "predictions" / "truth", export / "targets", replicates=0)
+    write_scores(score, tmp_path / "a.json")
+    assert read_scores(tmp_path / "a.json") == score
+    (tmp_path / "b.json").write_text('{"schema": "panoscene/score", "version": 2}')
+    with pytest.raises(SceneFormatError, match=r"b\.json"):
+        read_scores(tmp_path / "b.json")
+
+
+def test_cells_say_when_there_is_no_number() -> None:
+    assert Measured(value=None).low is None
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["eval", "export", "-o", "OUT", "--methods", "magic"],
+        ["eval", "export", "-o", "OUT", "--scenes", "0"],
+        ["eval", "score", "nowhere"],
+        ["eval", "score", "OUT"],
+        ["eval", "report", "OUT"],
+    ],
+)
+def test_bad_requests_end_with_one_message(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [str(tmp_path) if word == "OUT" else word for word in arguments]
+    assert main(arguments) == 2
+    assert capsys.readouterr().err.count("error") == 1
+    assert list(tmp_path.iterdir()) == []
