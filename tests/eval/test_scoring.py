@@ -12,7 +12,9 @@ from panoscene.eval import (
     export_predictions,
     read_scores,
     results_page,
+    run_score_benchmark,
     sample_targets,
+    score_benchmark_table,
     score_folder,
     summary_table,
     write_scores,
@@ -168,3 +170,14 @@ def test_bad_requests_end_with_one_message(
     assert main(arguments) == 2
     assert capsys.readouterr().err.count("error") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_benchmark_scores_as_many_rooms_as_it_says() -> None:
+    result = run_score_benchmark(repeats=2, scenes=3, objects=4, workers=1)
+    seconds = result["seconds"]
+    assert isinstance(seconds, list)
+    assert len(seconds) == 2
+    assert min(seconds) <= result["score_3_scenes_s"] <= max(seconds)
+    assert "3 scenes of 4 objects" in score_benchmark_table(result)
+    with pytest.raises(ValueError, match="workers"):
+        run_score_benchmark(workers=0)

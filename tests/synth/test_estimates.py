@@ -75,3 +75,16 @@ def test_an_empty_room_stays_empty_without_inventions() -> None:
 def test_rates_out_of_range_are_refused() -> None:
     with pytest.raises(ValueError, match="miss"):
         EstimateNoise(miss=1.5)
+
+
+def test_another_layout_leaves_the_objects_as_they_are() -> None:
+    truth = room(6)
+    usual, told = (
+        estimate_scene(truth, np.random.default_rng(3), layout=layout)
+        for layout in (None, truth.layout)
+    )
+    assert told.layout is truth.layout
+    assert told.objects.boxes.centre.equal(usual.objects.boxes.centre)
+    assert told.objects.score.equal(usual.objects.score)
+    assert told.relations is not None
+    assert told.relations.touching_wall.shape[1] == len(truth.layout.floor_polygon)

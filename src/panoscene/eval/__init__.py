@@ -53,10 +53,10 @@ from panoscene.eval._mesh_penetration import mesh_penetrations as mesh_penetrati
 from panoscene.eval._mesh_penetration import penetration_record as penetration_record
 from panoscene.eval._mesh_penetration import score_penetration as score_penetration
 from panoscene.eval._methods import METHODS as METHODS
+from panoscene.eval._methods import Inputs as Inputs
 from panoscene.eval._methods import Method as Method
 from panoscene.eval._methods import mean_box_scene as mean_box_scene
 from panoscene.eval._methods import with_boxes_of as with_boxes_of
-from panoscene.eval._methods import with_layout_of as with_layout_of
 from panoscene.eval._plausibility import PlausibilityRecord as PlausibilityRecord
 from panoscene.eval._plausibility import plausibility_record as plausibility_record
 from panoscene.eval._plausibility import plausibility_records as plausibility_records
@@ -96,6 +96,8 @@ from panoscene.eval._scene_records import SceneRecords as SceneRecords
 from panoscene.eval._scene_records import empty_scene as empty_scene
 from panoscene.eval._scene_records import scene_records as scene_records
 from panoscene.eval._score import score_folder as score_folder
+from panoscene.eval._score_benchmark import run_score_benchmark as run_score_benchmark
+from panoscene.eval._score_benchmark import score_benchmark_table as score_benchmark_table
 from panoscene.eval._semantic import SEMANTIC_POINTS as SEMANTIC_POINTS
 from panoscene.eval._semantic import SemanticRecord as SemanticRecord
 from panoscene.eval._semantic import SemanticScores as SemanticScores

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from panoscene.eval._methods import METHODS, Method
-from panoscene.scene import Scene, write_atomically, write_scene
+from panoscene.eval._methods import METHODS, Inputs, Method
+from panoscene.scene import Layout, Scene, write_atomically, write_scene
 from panoscene.synth import EstimateNoise, estimate_scene, sample_room
 
 TARGETS, PREDICTIONS, MANIFEST = "targets", "predictions", "export.json"
@@ -74,15 +74,16 @@ def export_predictions(
     check_names(names)
     noise = noise or EstimateNoise()
     tell("estimates")
-    estimates = [
-        estimate_scene(scene, np.random.default_rng([seed, k, 1]), noise)
-        for k, scene in enumerate(targets)
-    ]
+    inputs = Inputs(
+        targets,
+        [_estimate(scene, seed, k, noise) for k, scene in enumerate(targets)],
+        [_estimate(scene, seed, k, noise, scene.layout) for k, scene in enumerate(targets)],
+    )
     _write_folder(output / TARGETS, names, targets)
     done: dict[str, ExportedMethod] = {}
     for name, method in methods.items():
         tell(name)
-        scenes = method.run(targets, estimates)
+        scenes = method.run(inputs)
         _write_folder(output / PREDICTIONS / name, names, scenes)
         done[name] = ExportedMethod(method.kind, method.description)
     manifest = {
@@ -96,6 +97,12 @@ def export_predictions(
     }
     write_atomically(output / MANIFEST, json.dumps(manifest, indent=2) + "\n")
     return done
+
+
+def _estimate(
+    scene: Scene, seed: int, k: int, noise: EstimateNoise, layout: Layout | None = None
+) -> Scene:
+    return estimate_scene(scene, np.random.default_rng([seed, k, 1]), noise, layout=layout)
 
 
 def check_names(names: Sequence[str]) -> None:

@@ -134,7 +134,7 @@ def plausibility_at_recall(
 def kept_at_recall(  # noqa: PLR0917 - one table has six columns
     boxes: Sequence[OrientedBoxes],
     layouts: Sequence[Layout],
-    scores: Sequence[Float[np.ndarray, " n"]],
+    scores: Sequence[Float[np.ndarray, " _"]],
     found: Float[np.ndarray, " matched"],
     count: int,
     recall: float,

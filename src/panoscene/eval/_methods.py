@@ -22,14 +22,24 @@ _FARTHEST = 8.0
 
 
 @dataclass(frozen=True, slots=True)
+class Inputs:
+    """What methods may look at: the same rooms, one after the other."""
+
+    targets: Sequence[Scene]
+    estimates: Sequence[Scene]
+    in_true_layout: Sequence[Scene]
+    """The same estimates of objects, with the true layout and relations to its walls."""
+
+
+@dataclass(frozen=True, slots=True)
 class Method:
     """One row of a score table."""
 
     kind: MethodKind
     """``oracle``: it was told part of the truth; ``baseline``: it does not think."""
     description: str
-    run: Callable[[Sequence[Scene], Sequence[Scene]], list[Scene]]
-    """From the targets and the estimates of the same rooms to predictions."""
+    run: Callable[[Inputs], list[Scene]]
+    """To predictions, in the order of the targets."""
 
 
 def mean_box_scene(estimate: Scene) -> Scene:
@@ -59,18 +69,6 @@ def mean_box_scene(estimate: Scene) -> Scene:
     )
 
 
-def with_layout_of(estimate: Scene, target: Scene) -> Scene:
-    """Return the estimate in the target's room; relations to walls follow from its boxes."""
-    derived = relations_from_boxes(
-        estimate.objects.boxes, target.layout, estimate.panorama.camera_height, inside="any_corner"
-    )
-    old = estimate.relations
-    kept = derived if old is None else replace(
-        old, touching_wall=derived.touching_wall, relative_yaw_wall=derived.relative_yaw_wall
-    )  # fmt: skip
-    return replace(estimate, layout=target.layout, relations=kept)
-
-
 def with_boxes_of(estimate: Scene, target: Scene) -> Scene:
     """Return the target's objects in the estimated room, with the relations that follow."""
     objects: Objects = target.objects
@@ -90,15 +88,6 @@ def _arranged(estimates: Sequence[Scene], preset: str) -> list[Scene]:
         for first in range(0, len(estimates), _CHUNK)
         for result in arrange_scenes(estimates[first : first + _CHUNK], PRESETS[preset])
     ]
-
-
-def _pairs(
-    change: Callable[[Scene, Scene], Scene],
-) -> Callable[[Sequence[Scene], Sequence[Scene]], list[Scene]]:
-    def run(targets: Sequence[Scene], estimates: Sequence[Scene]) -> list[Scene]:
-        return [change(*pair) for pair in zip(estimates, targets, strict=True)]
-
-    return run
 
 
 def _by_fov(estimates: Sequence[Scene], fov_deg: int) -> list[Scene]:
@@ -121,38 +110,42 @@ FOV_DEG = (180, 120, 90, 60, 30)
 METHODS = MappingProxyType(
     {
         "estimates": Method(
-            "input", "simulated networks, nothing repaired", lambda _, estimates: list(estimates)
+            "input", "simulated networks, nothing repaired", lambda inputs: list(inputs.estimates)
         ),
         "default": Method(
             "ours",
             "estimates repaired with the preset default",
-            lambda _, estimates: _arranged(estimates, "default"),
+            lambda inputs: _arranged(inputs.estimates, "default"),
         ),
         "released": Method(
             "released",
             "estimates repaired with the authors' released settings",
-            lambda _, estimates: _arranged(estimates, "released"),
+            lambda inputs: _arranged(inputs.estimates, "released"),
         ),
         "mean-box": Method(
             "baseline",
             "mean sizes facing the camera in a square room",
-            lambda _, estimates: [mean_box_scene(scene) for scene in estimates],
+            lambda inputs: [mean_box_scene(scene) for scene in inputs.estimates],
         ),
         "true-layout": Method(
             "oracle",
             "estimates with the true layout, repaired with default",
-            lambda targets, estimates: _arranged(
-                _pairs(with_layout_of)(targets, estimates), "default"
-            ),
+            lambda inputs: _arranged(inputs.in_true_layout, "default"),
         ),
-        "true-boxes": Method("oracle", "true boxes in the estimated layout", _pairs(with_boxes_of)),
-        "truth": Method("oracle", "the targets themselves", lambda targets, _: list(targets)),
+        "true-boxes": Method(
+            "oracle",
+            "true boxes in the estimated layout",
+            lambda inputs: [
+                with_boxes_of(*pair) for pair in zip(inputs.estimates, inputs.targets, strict=True)
+            ],
+        ),
+        "truth": Method("oracle", "the targets themselves", lambda inputs: list(inputs.targets)),
     }
     | {
         f"default-{fov}": Method(
             "ours",
             f"default, each split of {fov} degrees on its own",
-            lambda _, estimates, fov=fov: _by_fov(estimates, fov),
+            lambda inputs, fov=fov: _by_fov(inputs.estimates, fov),
         )
         for fov in FOV_DEG
     }

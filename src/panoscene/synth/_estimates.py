@@ -58,7 +58,11 @@ class EstimateNoise:
 
 
 def estimate_scene(
-    scene: Scene, rng: np.random.Generator, noise: EstimateNoise | None = None
+    scene: Scene,
+    rng: np.random.Generator,
+    noise: EstimateNoise | None = None,
+    *,
+    layout: Layout | None = None,
 ) -> Scene:
     """Return the scene as an imperfect detector, layout, pose and relation network would.
 
@@ -73,9 +77,12 @@ def estimate_scene(
         scene: the true scene.
         rng: source of randomness.
         noise: how wrong.
+        layout: the room to use instead of the recovered one, such as the true one for an oracle;
+            the same state of ``rng`` then gives the same objects.
     """
     noise = noise or EstimateNoise()
-    layout = _estimated_layout(scene, rng, noise.boundary)
+    recovered = _estimated_layout(scene, rng, noise.boundary)
+    layout = recovered if layout is None else layout
     kept = torch.from_numpy(np.flatnonzero(rng.random(len(scene.objects.boxes)) >= noise.miss))
     found = _subset(scene.objects, kept)
     spurious = _invented(scene, rng, int(rng.poisson(noise.invent * len(scene.objects.boxes))))
