@@ -232,8 +232,8 @@ def test_an_unknown_method_is_refused() -> None:
 
 
 def test_records_add_up(generator: torch.Generator) -> None:
-    counts = torch.randint(0, 50, (12, 13), generator=generator)
-    parts = torch.randint(0, 50, (12, 13), generator=generator)
+    counts = torch.randint(0, 50, (12, 13), generator=generator).numpy()
+    parts = torch.randint(0, 50, (12, 13), generator=generator).numpy()
     together = score_semantic([SemanticRecord("", counts + parts)])
     apart = score_semantic([SemanticRecord("", counts), SemanticRecord("", parts)])
     assert torch.equal(together.iou, apart.iou)

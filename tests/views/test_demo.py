@@ -15,7 +15,7 @@ def test_the_demo_repairs_the_room_and_leaves_pictures(tmp_path: Path) -> None:
     result = run_demo(folder, seed=0)
     assert {path.name for path in folder.iterdir()} == {
         "before.json", "after.json", "certificate.json",
-        "before.png", "after.png", "comparison.png",
+        "before.png", "after.png", "comparison.png", "sheet.png", "report.html",
     }  # fmt: skip
     assert result.mean_iou_after > result.mean_iou_before
     assert result.colliding_pairs_after < result.colliding_pairs_before
@@ -25,11 +25,21 @@ def test_the_demo_repairs_the_room_and_leaves_pictures(tmp_path: Path) -> None:
     assert (before.objects.boxes.centre != after.objects.boxes.centre).any()
     certificate = json.loads(result.certificate.read_text())
     assert certificate["after"]["colliding_pairs"] == result.colliding_pairs_after
-    for picture in (result.before_picture, result.after_picture, result.comparison):
+    for picture in (
+        *(result.before_picture, result.after_picture),
+        *(result.comparison, result.sheet),
+    ):
         with Image.open(picture) as image:
             image.load()
             assert image.width >= 1200
-    assert json.loads(json.dumps(result.as_dict()))["comparison"].endswith("comparison.png")
+    page = result.report.read_text()
+    assert page.startswith("<!doctype html>")
+    assert page.rstrip().endswith("</html>")
+    assert "Sample room, disturbed and repaired" in page
+    plain = json.loads(json.dumps(result.as_dict()))
+    assert plain["comparison"].endswith("comparison.png")
+    assert plain["sheet"].endswith("sheet.png")
+    assert plain["report"].endswith("report.html")
 
 
 def test_the_sample_room_is_furnished_and_sound() -> None:

@@ -100,7 +100,10 @@ def test_samples_lie_on_their_lines(lines: list[tuple[tuple, tuple]]) -> None:
             for _, curve in cut_curves(
                 samples.lon[low:high], samples.lat[low:high], np.ones(high - low, dtype=bool)
             ):
-                assert np.abs(np.diff(curve[:, 0])).max() < np.deg2rad(2.0)
+                # at the poles themselves rounding decides what the lon is
+                away = np.abs(curve[:, 1]) < np.deg2rad(89.99)
+                step = np.abs(np.diff(curve[:, 0]))[away[1:] & away[:-1]]
+                assert (step < np.deg2rad(2.0)).all()
 
 
 def test_corners_of_boxes_are_ends_of_their_edges() -> None:

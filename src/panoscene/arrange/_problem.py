@@ -173,7 +173,7 @@ def _weight(score: Tensor, threshold: float, label: str) -> Tensor:
 
 
 def _confidence(batch: ArrangementBatch, settings: ArrangementSettings) -> Confidence:
-    """Return the weight of every entry (facts of the release: section 'energy terms')."""
+    """Return the weight of every entry, as the authors' release has it."""
     at, label = settings.thresholds, settings.label
     valid = batch.valid.to(batch.score.dtype)
     pair = batch.pair_valid.to(valid.dtype)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from panoscene.arrange import ArrangementSettings, Certificate, arrange_scenes
+from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import (
     CERTIFICATE,
@@ -86,9 +87,12 @@ def _arranged(files: Sequence[Path], settings: ArrangementSettings) -> Iterator[
     scenes: list[tuple[Path, Scene]] = []
     for file in files:
         try:
-            scenes.append((file, read_scene(file)))
+            scene = read_scene(file)
         except SceneFormatError as error:
             yield _Result(file, error=str(error))
+            continue
+        note_doubts(scene, file)
+        scenes.append((file, scene))
     for batch in batches(scenes):
         yield from _solved(batch, settings)
 
@@ -148,7 +152,7 @@ def _draw(result: _Result, target: Path, settings: ArrangementSettings, extras: 
     if not extras.endings or before is None or after is None or certificate is None:
         return
     # matplotlib takes as long to load as a scene to repair
-    from panoscene.cli._photos import photo_path  # noqa: PLC0415
+    from panoscene.cli._photos import photo_image  # noqa: PLC0415
     from panoscene.views import (  # noqa: PLC0415
         describe_violations,
         draw_animation,
@@ -164,7 +168,7 @@ def _draw(result: _Result, target: Path, settings: ArrangementSettings, extras: 
             draw_comparison([("Before", before), ("After", after)], path, captions=captions)
     if extras.report:
         path = beside(target, REPORT)
-        photo = photo_path(before, result.file, None)
+        photo = photo_image(before, result.file, None)
         with writing(path), blaming(path):
             write_report(
                 path,

@@ -216,8 +216,9 @@ def bench(subject: Subject, *, repeats: Count = 5, json: Flag = False) -> int:
     """Measure how fast this machine is: the medians of several repeats.
 
     For arrange: one scene of 20 objects, a batch of 64 of them, one of 200 objects, and how soon
-    the default preset is better than the released one at its end. Takes about a minute. For
-    example:
+    the default preset is better than the released one at its end. Takes about a minute.
+
+    For score: 500 scenes of 20 objects from disk to every metric. Takes some minutes. For example:
 
         panoscene bench arrange
         panoscene bench arrange --repeats 3 --json | jq .scene_20_ms
@@ -229,7 +230,7 @@ def bench(subject: Subject, *, repeats: Count = 5, json: Flag = False) -> int:
     """
     from panoscene.cli._measure import run_bench
 
-    return run_bench(repeats, as_json=json)
+    return run_bench(subject, repeats, as_json=json)
 
 
 def experiment(
@@ -257,7 +258,7 @@ def experiment(
         subject: What to examine.
         output: Folder that also gets the table and all figures, as arrange.md and arrange.json
             (safety.md and safety.json).
-        scenes: How many rooms: 100 unless you say otherwise, or 10,000 in the safety trial.
+        scenes: How many rooms: 100 unless you say otherwise, or ten thousand in the safety trial.
         seed: Seed of everything random: the same seed gives the same rooms.
         json: Print the rows and the conditions as JSON.
     """

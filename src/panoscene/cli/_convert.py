@@ -11,7 +11,7 @@ from torch import Tensor
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import blaming
 from panoscene.cli._kinds import kind_of, write_as
-from panoscene.cli._models import MODELS, read_model, write_model
+from panoscene.cli._models import MODELS, WITH_PHOTO, read_model, write_model
 from panoscene.cli._pictures import PanoramaOptions, convert_panorama
 from panoscene.cli._relations import with_relations
 from panoscene.cli._terminal import note
@@ -54,6 +54,8 @@ def convert_file(
         InputError: There is no such conversion, or an option does not belong to it.
     """
     kind, wanted = kind_of(file), kind_of(output)
+    if photo is not None and (kind == "picture" or wanted not in WITH_PHOTO):
+        raise InputError(f"--photo: found it with {output}, expected it for .glb or .html")
     if kind == "picture":
         _refuse(scene_options, file, kind)
         note(convert_panorama(file, output, panorama_options))
@@ -76,8 +78,6 @@ def convert_file(
     if wanted in MODELS:
         note(write_model(wanted, scene, output, file, photo))
         return 0
-    if photo is not None:
-        raise InputError(f"--photo: found it with a {wanted}, expected it for .glb or .html")
     note(write_as(wanted, scene, output, file))
     return 0
 

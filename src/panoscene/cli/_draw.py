@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from jaxtyping import Float
 from torch import Tensor
 
+from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import blaming, check_folder, writing
+from panoscene.cli._files import blaming, check_folder, relocated, write_bytes, writing
 from panoscene.cli._photos import photo_image
+from panoscene.cli._progress import progress_words
 from panoscene.cli._terminal import note
 from panoscene.scene import Scene, read_scene
 from panoscene.views import (
@@ -30,22 +33,29 @@ def draw_file(file: Path, output: Path, photo: Path | None, truth: Path | None) 
     """Draw a scene into a folder and return the exit code."""
     check_folder(output)
     scene = read_scene(file)
+    note_doubts(scene, file)
     reference = None if truth is None else read_scene(truth)
     image = photo_image(scene, file, photo)
-    with blaming(file), writing(output / "report.html"):
-        for name in draw_scene(scene, output, image=image, reference=reference):
-            note(f"wrote {output / name}")
+    with TemporaryDirectory(prefix="panoscene-") as name, progress_words() as progress:
+        drafts = Path(name)
+        with blaming(file):
+            for drawn in _pictures(scene, drafts, image=image, reference=reference):
+                progress(f"drew {drawn}")
+        # all are there: nobody finds some of them after an error
+        for draft in sorted(drafts.iterdir()):
+            write_bytes(output / draft.name, draft.read_bytes())
+    note(f"wrote {output}: a page to open in a browser, report.html, and pictures")
     return 0
 
 
-def draw_scene(
+def _pictures(
     scene: Scene,
     output: Path,
     *,
-    image: Float[Tensor, "3 height width"] | None = None,
-    reference: Scene | None = None,
+    image: Float[Tensor, "3 height width"] | None,
+    reference: Scene | None,
 ) -> Iterator[str]:
-    """Yield the names of the pictures of a scene as they are written."""
+    """Draw a scene and yield the names of the files as they are written."""
     draw_birds_eye(scene, output / "birds-eye.png", reference=reference)
     yield "birds-eye.png"
     draw_overlay(scene, output / "overlay.png", image=image, reference=reference)
@@ -73,22 +83,21 @@ def serve_file(
     file: Path, *, host: str, port: int, photo: Path | None, save_to: Path | None
 ) -> int:
     """Serve the live editor of a scene until it is interrupted, and return the exit code."""
-    from panoscene.cli._photos import photo_path  # noqa: PLC0415
-    from panoscene.viewer import view_file  # noqa: PLC0415
+    from panoscene.viewer import serve  # noqa: PLC0415
 
     if save_to is not None and save_to.suffix != ".json":
         raise InputError(f"--output {save_to}: found another ending, expected .json")
     if not 0 <= port <= 65535:
         raise InputError(f"--port: found {port}, expected 0 to 65535 (0: any free one)")
-    if photo is None:
-        photo = photo_path(read_scene(file), file, None)
-    elif not photo.is_file():
-        raise InputError(f"--photo {photo}: found no file there, expected a panorama")
+    scene = read_scene(file)
+    note_doubts(scene, file)
+    image = photo_image(scene, file, photo)
     if save_to is not None:
-        save_to.parent.mkdir(parents=True, exist_ok=True)
+        with writing(save_to):
+            scene = relocated(scene, file, save_to)
     try:
-        with blaming("view"):
-            viewer = view_file(file, host=host, port=port, photo=photo, save_to=save_to)
+        with blaming(f"view {file}"):
+            viewer = serve(scene, host=host, port=port, image=image, save_to=save_to)
         with viewer:
             note(f"{viewer.url} shows {file}; press Ctrl-C to end")
             viewer.wait()

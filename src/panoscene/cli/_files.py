@@ -64,6 +64,12 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 def write_scene_from(source: Path, scene: Scene, target: Path) -> None:
     """Write a scene that was read from another file; the photo is still found from there."""
+    with writing(target):
+        write_scene(relocated(scene, source, target), target)
+
+
+def relocated(scene: Scene, source: Path, target: Path) -> Scene:
+    """Return a scene read from one file so that its photo is found from another one."""
     photo = scene.panorama.file
     if photo is not None and not Path(photo).is_absolute():
         try:
@@ -71,8 +77,7 @@ def write_scene_from(source: Path, scene: Scene, target: Path) -> None:
         except ValueError:  # another drive
             photo = (source.parent / photo).resolve().as_posix()
         scene = replace(scene, panorama=replace(scene.panorama, file=photo))
-    with writing(target):
-        write_scene(scene, target)
+    return scene
 
 
 def scene_files(arguments: Sequence[str]) -> list[Path]:

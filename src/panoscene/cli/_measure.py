@@ -12,19 +12,24 @@ from panoscene.eval import (
     run_arrange_benchmark,
     run_arrange_experiment,
     run_arrange_safety,
+    run_score_benchmark,
     safety_table,
+    score_benchmark_table,
 )
 
 
-def run_bench(repeats: int, *, as_json: bool) -> int:
-    """Run the benchmark of the optimiser and return the exit code."""
+def run_bench(subject: str, repeats: int, *, as_json: bool) -> int:
+    """Run the benchmark of the optimiser, or of scoring, and return the exit code."""
     _at_least(1, "--repeats", repeats)
     with progress_words() as progress:
-        result = run_arrange_benchmark(repeats=repeats, progress=progress)
+        if subject == "score":
+            result = run_score_benchmark(repeats=repeats, progress=progress)
+        else:
+            result = run_arrange_benchmark(repeats=repeats, progress=progress)
     if as_json:
         say_json(result)
     else:
-        say(benchmark_table(result))
+        say((score_benchmark_table if subject == "score" else benchmark_table)(result))
     return 0
 
 

@@ -2,13 +2,18 @@
 
 from pathlib import Path
 
-from panoscene.cli._files import blaming, writing
+from jaxtyping import Float
+from torch import Tensor
+
+from panoscene.cli._files import blaming, relocated, writing
 from panoscene.cli._kinds import Kind
 from panoscene.cli._photos import photo_image
 from panoscene.scene import Scene
 
 MODELS: tuple[Kind, ...] = ("GLB", "OBJ", "SVG", "DXF", "page")
 """What other programs open."""
+WITH_PHOTO: tuple[Kind, ...] = ("GLB", "page")
+"""Those that show the photo."""
 
 
 def read_model(file: Path) -> Scene:
@@ -30,9 +35,10 @@ def write_model(kind: Kind, scene: Scene, output: Path, source: Path, photo: Pat
     """
     from panoscene import exports  # noqa: PLC0415
 
+    image = photo_image(scene, source, photo) if kind in WITH_PHOTO else None
     with blaming(source), writing(output):
         if kind == "GLB":
-            exports.write_glb(scene, output, image=photo_image(scene, source, photo))
+            exports.write_glb(relocated(scene, source, output), output, image=image)
         elif kind == "OBJ":
             exports.write_obj(scene, output)
         elif kind == "SVG":
@@ -40,15 +46,14 @@ def write_model(kind: Kind, scene: Scene, output: Path, source: Path, photo: Pat
         elif kind == "DXF":
             exports.write_floor_plan_dxf(scene, output)
         else:
-            _write_page(scene, output, source, photo)
+            _write_page(scene, output, image)
     names = {"SVG": "floor plan", "DXF": "floor plan", "page": "page"}
     return f"wrote {output}: {names.get(kind, 'model')} of {len(scene.objects.boxes)} objects"
 
 
-def _write_page(scene: Scene, output: Path, source: Path, photo: Path | None) -> None:
+def _write_page(scene: Scene, output: Path, image: Float[Tensor, "3 height width"] | None) -> None:
     from panoscene.views import render_panorama, write_report  # noqa: PLC0415
 
-    image = photo_image(scene, source, photo)
     caption = "" if image is not None else "Rendered from the boxes."
     shown = render_panorama(scene) if image is None else image
     write_report(output, scene, image=shown, image_caption=caption)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import blaming
 from panoscene.cli._kinds import check_kind, write_as
@@ -29,7 +30,9 @@ def show_relations(
 ) -> int:
     """Print or write the relations of a scene and return the exit code."""
     kind = None if output is None else check_kind(output, ("scene", "graph JSON", "GraphML"))
-    known = with_relations(read_scene(file), file, keep=keep)
+    scene = read_scene(file)
+    note_doubts(scene, file)
+    known = with_relations(scene, file, keep=keep)
     with blaming("--threshold"):
         triples = relation_triples(known, threshold=threshold)
         if as_json:

@@ -46,7 +46,7 @@ def boundary_from_layout(
         - the camera stands at world (0, 0, camera_height)
         - occluded walls do not appear
 
-    Source: HorizonNet's boundary target (facts: layout, ground truth).
+    Source: HorizonNet's boundary target.
 
     Examples:
         >>> room = torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
@@ -75,7 +75,7 @@ def corner_signal_from_layout(
         - the camera stands at world (0, 0)
         - corners hidden behind a wall are left out
 
-    Source: HorizonNet's corner target (facts: layout, ground truth).
+    Source: HorizonNet's corner target.
 
     Examples:
         >>> room = torch.tensor([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])

@@ -96,9 +96,12 @@ def document_problems(model: SceneModel) -> list[Problem]:
     """Return what types alone cannot see: polygon, ids, shapes, names in the relations."""
     names = names_in_model(model.objects)
     walls = wall_names(len(model.layout.floor_polygon))
-    problems = _panorama_problems(model.panorama) + _layout_problems(model.layout)
-    problems += _id_problems(names) + _shape_problems(model.objects)
-    if model.relations is not None:
+    problems = _text_problems(model)
+    problems += _panorama_problems(model.panorama) + _layout_problems(model.layout)
+    unclear = _id_problems(names)
+    problems += unclear + _shape_problems(model.objects)
+    # when a name is given twice, others are missing: relations would be blamed for that
+    if model.relations is not None and not unclear:
         problems += _relation_problems(model.relations, set(names), set(walls))
     return problems
 
@@ -108,6 +111,17 @@ def names_in_model(objects: list[ObjectModel]) -> list[str]:
     return [
         f"{item.category}-{k}" if item.id is None else item.id for k, item in enumerate(objects)
     ]
+
+
+def _text_problems(model: SceneModel) -> list[Problem]:
+    problems: list[Problem] = []
+    for field, text in (("$.name", model.name), ("$.panorama.file", model.panorama.file)):
+        # JSON can escape one half of a character; no file can be written with it
+        if re.search("[\ud800-\udfff]", text or ""):
+            problems.append(
+                Problem(field, shown(text), "characters, not halves of them (surrogates)")
+            )
+    return problems
 
 
 def _panorama_problems(panorama: PanoramaModel) -> list[Problem]:
@@ -154,6 +168,8 @@ def _id_problems(names: list[str]) -> list[Problem]:
         field = f"$.objects[{k}].id"
         if name in ROOM_PARTS or re.fullmatch(r"wall-\d+", name):
             problems.append(Problem(field, shown(name), "a name that the room does not use"))
+        if not name.strip():
+            problems.append(Problem(field, shown(name), "a name that can be seen"))
         if name in first:
             expected = f"a unique name (objects[{first[name]}] has it too)"
             problems.append(Problem(field, shown(name), expected))
@@ -183,18 +199,11 @@ def _shape_problems(objects: list[ObjectModel]) -> list[Problem]:
 def _relation_problems(
     relations: RelationsModel, objects: set[str], walls: set[str]
 ) -> list[Problem]:
-    problems: list[Problem] = []
+    places: dict[tuple[str, bool], list[tuple[str, ...]]] = {}
 
     def check(place: tuple[str, ...], name: str, allowed: set[str]) -> None:
         if name not in allowed:
-            close = difflib.get_close_matches(name, sorted(allowed), n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
-            kind = "an object or wall" if allowed is everything else "an object"
-            problems.append(
-                Problem(
-                    json_path(("relations", *place)), shown(name), f"{kind} of this scene{hint}"
-                )
-            )
+            places.setdefault((name, allowed is everything), []).append(place)
 
     everything = objects | walls
     for predicate in ("on_floor", "under_ceiling", "inside_room"):
@@ -208,4 +217,21 @@ def _relation_problems(
             check((predicate,), subject, objects)
             for name in targets:
                 check((predicate, subject), name, allowed)
-    return problems
+    # one misspelt object is one problem, in however many relations it is
+    return [
+        _unknown_name(name, found, sorted(everything if walls_too else objects), walls_too)
+        for (name, walls_too), found in places.items()
+        if walls_too or (name, True) not in places
+    ]
+
+
+def _unknown_name(
+    name: str, places: list[tuple[str, ...]], allowed: list[str], walls_too: bool
+) -> Problem:
+    close = difflib.get_close_matches(name, allowed, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    kind = "an object or wall" if walls_too else "an object"
+    more = f" (and in {len(places) - 1} other places)" if len(places) > 1 else ""
+    return Problem(
+        json_path(("relations", *places[0])), f"{shown(name)}{more}", f"{kind} of this scene{hint}"
+    )
