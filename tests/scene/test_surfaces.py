@@ -24,6 +24,7 @@ L_ROOM = [[-2.0, -2.0], [3.0, -2.0], [3.0, 1.0], [0.5, 1.0], [0.5, 2.5], [-2.0, 
 def solid(*parts: Surface) -> trimesh.Trimesh:
     meshes = [trimesh.Trimesh(p.vertices.numpy(), p.faces.numpy(), process=False) for p in parts]
     merged = trimesh.util.concatenate(meshes)
+    assert isinstance(merged, trimesh.Trimesh)
     merged.merge_vertices()
     return merged
 

@@ -11,8 +11,12 @@ from panoscene.eval._methods import METHODS, Inputs, Method
 from panoscene.scene import Layout, Scene, write_atomically, write_scene
 from panoscene.synth import EstimateNoise, estimate_scene, sample_room
 
-TARGETS, PREDICTIONS, MANIFEST = "targets", "predictions", "export.json"
-"""Names inside an export: the truth, one folder for each method, and what was done."""
+TARGETS = "targets"
+"""Folder of the true scenes in an export."""
+PREDICTIONS = "predictions"
+"""Folder in an export with one folder for each method."""
+MANIFEST = "export.json"
+"""File in an export that says how it was made."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,7 +89,7 @@ def draw_frame(stage: Stage, boxes: OrientedBoxes, number: int, title: str) -> I
     draw = ImageDraw.Draw(picture)
     draw.text((_MARGIN, HEADER / 2 + 2), title, fill=INK, font=font(18.0, bold=True), anchor="lm")
     count = len(pairs)
-    words = "no collisions" if count == 0 else f"{count} collision" + "s" * (count > 1)
+    words = "no pair collides" if count == 0 else f"{count} collision" + "s" * (count > 1)
     place = (stage.size_px[0] - _MARGIN, HEADER / 2 + 2)
     draw.text(place, words, fill=ALARM if count else INK, font=font(18.0, bold=True), anchor="rm")
     _draw_curve(picture, stage, number)
