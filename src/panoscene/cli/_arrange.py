@@ -68,6 +68,9 @@ def arrange_files(
         say_json([_as_json(result, targets[result.file], extras) for result in in_order])
     else:
         _say_table(in_order, targets[files[0]] if len(files) == 1 else output)
+        for ending in extras.endings.values() if len(files) == 1 else ():
+            if in_order[0].certificate is not None:
+                say(f"wrote {beside(targets[files[0]], ending)}")
     return 2 if any(result.error for result in in_order) else 0
 
 

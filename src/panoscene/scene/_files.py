@@ -103,7 +103,10 @@ def _parsed(text: str, file: str) -> object:
         return json.loads(text, object_pairs_hook=_unique)
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
-        if error.pos >= len(text.rstrip()):
+        if file.lower().endswith(".csv"):
+            found = "a table of boxes (.csv)"
+            problem = Problem("the file", found, "a scene; make one with panoscene convert")
+        elif error.pos >= len(text.rstrip()):
             problem = Problem(place, "the end of the file", "more JSON: the file looks truncated")
         elif error.msg.startswith("Unterminated string"):
             problem = Problem(place, "text without an end", "a closing quote (truncated?)")
