@@ -1,0 +1,31 @@
+"""Furniture models: read from libraries, made from parameters, kept in a cache."""
+
+from ._archives import ArchiveLimits as ArchiveLimits
+from ._archives import FolderFiles as FolderFiles
+from ._archives import ModelFiles as ModelFiles
+from ._archives import ZipFiles as ZipFiles
+from ._attribution import attribution as attribution
+from ._cache import CacheIndex as CacheIndex
+from ._cache import ModelEntry as ModelEntry
+from ._debian import fetch_libraries as fetch_libraries
+from ._errors import AssetError as AssetError
+from ._library import ModelLibrary as ModelLibrary
+from ._library import add_models as add_models
+from ._library import load_library as load_library
+from ._prepare import AssetReport as AssetReport
+from ._prepare import Progress as Progress
+from ._prepare import prepare_assets as prepare_assets
+from ._prepare import prepare_shapes as prepare_shapes
+from ._records import CadModel as CadModel
+from ._records import LightSource as LightSource
+from ._records import Material as Material
+from ._records import MaterialKind as MaterialKind
+from ._records import Placement as Placement
+from ._shape_files import ShapeSamples as ShapeSamples
+from ._shape_files import sample_shape as sample_shape
+from ._specs import ModelSpec as ModelSpec
+from ._specs import known_models as known_models
+from ._split import Part as Part
+from ._split import split_models as split_models
+from ._watertight import ClosedSurface as ClosedSurface
+from ._watertight import close_surface as close_surface

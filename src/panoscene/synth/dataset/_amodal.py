@@ -1,0 +1,56 @@
+"""How much of an object there would be to see if nothing stood in front of it."""
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
+
+_MARGIN = 0.01
+"""Radians around the cone that holds the object."""
+
+
+def covered_pixels(
+    vertices: Float64[np.ndarray, "vertices 3"],
+    faces: Int32[np.ndarray, "faces 3"],
+    directions: Float32[np.ndarray, "n 3"],
+    seen: Bool[np.ndarray, " n"],
+) -> Int64[np.ndarray, " m"]:
+    """Return the indices of the directions in which a mesh lies, alone in the world.
+
+    Args:
+        vertices: Relative to the camera, in the frame of the directions.
+        faces: Seen from both sides.
+        directions: Of unit length.
+        seen: Where it is known to be visible; these count without a ray.
+    """
+    length = np.linalg.norm(vertices, axis=1)
+    towards = vertices / np.maximum(length, 1e-9)[:, None]
+    axis = towards.mean(axis=0)
+    axis /= max(float(np.linalg.norm(axis)), 1e-9)
+    narrowest = float((towards @ axis).min())
+    near = seen.copy()
+    if narrowest > 0.05:  # a cone of less than 87 degrees holds all vertices, and so all faces
+        limit = np.cos(min(np.arccos(narrowest) + _MARGIN, np.pi))
+        candidates = np.flatnonzero((directions @ axis.astype(np.float32) >= limit) & ~seen)
+    else:
+        candidates = np.flatnonzero(~seen)
+    candidates = candidates[_meets_bounds(vertices, directions[candidates])]
+    if len(candidates):
+        world = EmbreeScene(robust=True)
+        TriangleMesh(world, np.ascontiguousarray(vertices, np.float32), faces)
+        rays = np.ascontiguousarray(directions[candidates])
+        near[candidates[world.run(np.zeros_like(rays), rays) >= 0]] = True
+    return np.flatnonzero(near)
+
+
+def _meets_bounds(
+    vertices: Float64[np.ndarray, "vertices 3"], directions: Float32[np.ndarray, "n 3"]
+) -> Bool[np.ndarray, " n"]:
+    """Return whether rays from the origin meet the box of the vertices, along the axes."""
+    low = (vertices.min(axis=0) - 1e-3).astype(np.float32)
+    high = (vertices.max(axis=0) + 1e-3).astype(np.float32)
+    tiny = np.float32(1e-9)
+    slope = np.float32(1) / np.where(np.abs(directions) < tiny, tiny, directions)
+    one, two = low * slope, high * slope
+    enter, leave = np.minimum(one, two).max(axis=1), np.maximum(one, two).min(axis=1)
+    return (enter <= leave) & (leave >= 0)

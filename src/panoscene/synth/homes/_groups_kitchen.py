@@ -1,0 +1,216 @@
+"""Kitchens: a run of units along one or two walls, what hangs above it, and islands."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._groups_living import things_on
+from ._putting import above, along, at_wall, near, on_top
+from ._space import Piece, Space
+from ._stock import Item
+
+_DEPTH = 0.62
+
+
+@dataclass(slots=True)
+class _Leg:
+    """A part of a run: units side by side at one wall, from one of its ends."""
+
+    wall: int
+    from_start: bool
+    used: float
+    """Metres along the wall that are taken already."""
+
+
+def kitchen(space: Space) -> Piece | None:
+    """Add a run of kitchen units, with a hood above the stove and cabinets on the wall."""
+    height = float(space.rng.uniform(0.85, 0.92))
+    best: list[Piece] = []
+    for attempt in range(40):
+        mark = space.mark()
+        units = _units(space)
+        if attempt >= 12:
+            units.remove("fridge")
+        run = _run(space, units, height)
+        kinds = {piece.category for piece in run}
+        complete = "sink" in kinds and kinds & {"stove", "oven"}
+        least = 6 if attempt < 12 else 4 if attempt < 24 else 3
+        if complete and len(run) >= least and space.has_free_ways():
+            best = run
+            break
+        space.rollback(mark)
+    if not best:
+        return None
+    if not any(piece.category == "fridge" for piece in best):
+        item = _unit(space, "fridge", height, 1.0)
+        at_wall(space, item, access=0.7, corner=0.8)
+    _above_run(space, best)
+    _on_run(space, best)
+    return best[0]
+
+
+def _units(space: Space) -> list[str]:
+    """Return what stands in a run, in its order: fridge at an end, sink and stove apart."""
+    rng = space.rng
+    cook = "oven" if rng.random() < 0.45 else "stove"
+    base = "bottom_cabinet_no_top" if rng.random() < 0.2 else "bottom_cabinet"
+    middle = [base, "sink", "dishwasher" if rng.random() < 0.65 else base, base, cook, base]
+    if rng.random() < 0.5:
+        middle = [base, cook, base, "sink", "dishwasher" if rng.random() < 0.65 else base, base]
+    if rng.random() < 0.25:
+        middle.insert(3, "counter")
+    if rng.random() < 0.25:
+        middle.append("washer")
+    return ["fridge", *middle] if rng.random() < 0.5 else [*middle, "fridge"]
+
+
+def _unit(space: Space, name: str, height: float, most: float) -> Item | None:
+    """Return one unit, at most ``most`` metres wide and as deep and high as the others."""
+    stock = space.stock
+    flush = (height - 0.012, height + 0.012)
+    if name == "fridge":
+        return stock.take(
+            "fridge", width=(0.5, min(0.95, most)), depth=(0.55, 0.75), height=(0.8, 2.1)
+        )
+    if name == "sink":
+        return stock.take(
+            "sink",
+            width=(0.5, min(1.25, most)),
+            depth=(0.5, 0.66),
+            height=(height, height + 0.38),
+            where=lambda model: model.placement == "floor" and model.size[1] > 0.55,
+        ) or stock.take(
+            "sink", width=(0.45, min(1.2, most)), depth=(0.42, 0.66), height=(0.8, 1.25)
+        )
+    widest = {"counter": 1.9, "bottom_cabinet": 1.0, "bottom_cabinet_no_top": 1.0}.get(name, 0.75)
+    deep = (0.52, 0.66)
+    return stock.take(name, width=(0.3, min(widest, most)), depth=deep, height=flush)
+
+
+def _run(space: Space, units: list[str], height: float) -> list[Piece]:
+    """Put units along a wall, and around the corner where the wall ends."""
+    walls, rng = space.walls, space.rng
+    wall = int(rng.choice(len(walls.length), p=walls.length**2 / (walls.length**2).sum()))
+    legs = [_Leg(wall, bool(rng.random() < 0.5), 0.0)]
+    leg = legs[0]
+    run: list[Piece] = []
+    turned, begun = False, 0
+    rest = list(units)
+    while rest:
+        room = walls.length[leg.wall] - leg.used
+        placed = None
+        item = _unit(space, rest[0], height, max(room, 0.3))
+        if item is not None and item.size[0] <= room + 1e-6:
+            placed = _place_unit(space, leg, item)
+        if placed is not None:
+            run.append(placed)
+            rest.pop(0)
+            continue
+        if begun == len(run) and room > 1.2:
+            leg.used += 0.15  # a door or a window down to the floor: begin behind it
+            continue
+        if rest[0] not in ("sink", "stove", "oven") and len(rest) > 1 and rng.random() < 0.5:
+            rest.pop(0)
+            continue
+        if turned or room > 0.75:
+            break
+        following = _around_corner(space, leg)
+        if following is None:
+            break
+        leg, turned, begun = following, True, len(run)
+    return run
+
+
+def _around_corner(space: Space, leg: _Leg) -> _Leg | None:
+    """Return the leg that begins at the far end of another one, at an inner corner."""
+    walls = space.walls
+    count = len(walls.length)
+    other = (leg.wall + (1 if leg.from_start else -1)) % count
+    first, second = (leg.wall, other) if leg.from_start else (other, leg.wall)
+    inner = float(walls.along[first] @ walls.normal[second]) < -0.5
+    return _Leg(other, leg.from_start, _DEPTH + 0.04) if inner else None
+
+
+def _place_unit(space: Space, leg: _Leg, item: Item) -> Piece | None:
+    walls = space.walls
+    middle = leg.used + item.size[0] / 2
+    if not leg.from_start:
+        middle = walls.length[leg.wall] - middle
+    place = walls.start[leg.wall] + walls.along[leg.wall] * middle
+    place = place + walls.normal[leg.wall] * item.size[1] / 2
+    placed = space.put(
+        item, np.array([[*place, item.size[2] / 2]]), walls.yaw[[leg.wall]], access=0.8,
+        companion=True, wall=np.array([leg.wall]),
+    )  # fmt: skip
+    if placed is not None:
+        leg.used += float(item.size[0]) + 0.002
+    return placed
+
+
+def _above_run(space: Space, run: list[Piece]) -> None:
+    """Hang a hood above the stove and cabinets above the other low units."""
+    stock = space.stock
+    hung = space.rng.random() < 0.8
+    bottom = float(space.rng.uniform(1.38, 1.5))
+    cabinet = stock.take("top_cabinet", width=(0.35, 0.9), depth=(0.28, 0.42), height=(0.5, 0.95))
+    for unit in run:
+        if unit.category in ("stove", "oven"):
+            wide = (0.5, max(0.6, float(unit.size[0]) + 0.05))
+            hood = stock.take("range_hood", width=wide, height=(0.1, max(0.2, space.ceiling - 1.6)))
+            above(space, hood, unit, 1.55)
+        elif hung and unit.size[2] < 1.3 and cabinet is not None:
+            item = stock.take(
+                "top_cabinet", width=(max(0.3, float(unit.size[0]) - 0.02), float(unit.size[0])),
+                depth=(float(cabinet.size[1]) - 0.02, float(cabinet.size[1]) + 0.02),
+                height=(0.45, max(0.5, space.ceiling - bottom)),
+                where=lambda model: model.id == cabinet.model.id,
+            )  # fmt: skip
+            if item is None:
+                item = stock.take(
+                    "top_cabinet", width=(0.3, float(unit.size[0])), depth=(0.25, 0.42)
+                )
+            if item is not None:
+                along(space, item, unit, 0.0, bottom=bottom)
+
+
+def _on_run(space: Space, run: list[Piece]) -> None:
+    """Put things on the units: a hob above the oven, a microwave, a coffee machine."""
+    stock = space.stock
+    tops = [p for p in run if p.category.startswith(("bottom_cabinet", "counter", "dishwasher"))]
+    for unit in run:
+        if unit.category == "oven":
+            hob = stock.take("cooktop", width=(0.28, float(unit.size[0])), depth=(0.3, 0.55))
+            on_top(space, hob, unit, right=0.0, back=0.5, spread=0.0)
+    for name, chance in (("microwave", 0.55), ("coffee_machine", 0.55), ("plant", 0.2)):
+        if tops and space.maybe(chance):
+            lead = tops[int(space.rng.integers(len(tops)))]
+            size = (0.1, 0.6)
+            item = stock.take(name, width=size, depth=(0.1, 0.5), height=(0.1, 0.45))
+            on_top(space, item, lead, back=0.8, spread=0.15)
+    for lead in tops:
+        things_on(space, lead, 0.35, "")
+
+
+def island(space: Space) -> Piece | None:
+    """Add a counter in the middle of a large kitchen, with stools on one side."""
+    runs = [p for p in space.pieces if p.category in ("stove", "oven", "sink", "dishwasher")]
+    item = space.stock.take("counter", width=(1.0, 2.0), depth=(0.6, 1.0), height=(0.8, 1.0))
+    if not runs or item is None:
+        return None
+    stool = space.stock.take("stool", height=(0.6, 1.15))
+    for _ in range(20):
+        mark = space.mark()
+        lead = runs[int(space.rng.integers(len(runs)))]
+        front = (lead.size[1] + item.size[1]) / 2 + space.rng.uniform(0.95, 1.2)
+        placed = near(space, item, lead, space.rng.uniform(-1.0, 1.0), front, turn=np.pi)
+        if placed is not None:
+            count = min(int(placed.size[0] / 0.55), 3)
+            for k in range(count if stool is not None else 0):
+                right = ((k + 0.5) / count - 0.5) * placed.size[0]
+                away = -(placed.size[1] + stool.size[1]) / 2 - 0.03 if stool is not None else 0.0
+                near(space, stool, placed, right, away)
+            if space.has_free_ways():
+                things_on(space, placed, 0.8, "", "", "plant")
+                return placed
+        space.rollback(mark)
+    return None
