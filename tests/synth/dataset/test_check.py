@@ -139,9 +139,10 @@ def torn_distance(panorama: Loaded) -> Loaded:
 
 
 def torn_instances(panorama: Loaded) -> Loaded:
-    instance = panorama.instance.copy()
-    instance[:, -64:] = np.roll(instance[:, -64:], 200, axis=0)
-    return replace(panorama, instance=instance)
+    """Slide the columns down more and more, so that only the seam is torn."""
+    height, width = panorama.instance.shape
+    rows = np.arange(height)[:, None] + np.linspace(0, height / 2, width).astype(int)
+    return replace(panorama, instance=panorama.instance[rows % height, np.arange(width)])
 
 
 def black(panorama: Loaded) -> Loaded:

@@ -104,7 +104,9 @@ def test_scaling_moves_lamps_and_supports() -> None:
     assert tall.lights[0].position[2] == pytest.approx(2.0 * lamp.lights[0].position[2])
     chest = make_model("chest", 0, texture_size=0)
     assert chest.support_height is not None
-    assert scale_model(chest, (1, 1, 0.5)).support_height == pytest.approx(chest.support_height / 2)
+    assert scale_model(chest, (1.0, 1.0, 0.5)).support_height == pytest.approx(
+        chest.support_height / 2
+    )
     np.testing.assert_allclose(np.linalg.norm(tall.normals, axis=1), 1.0, atol=1e-5)
 
 
@@ -112,5 +114,5 @@ def test_wrong_arguments_are_named() -> None:
     model = make_model("mirror", 0, texture_size=0)
     with pytest.raises(ValueError, match="scale is"):
         scale_model(model, (1.0, 0.0, 1.0))
-    with pytest.raises(ValueError, match="size_jitter is 0.9"):
+    with pytest.raises(ValueError, match=r"size_jitter is 0\.9"):
         vary_model(model, np.random.default_rng(0), 0.9)

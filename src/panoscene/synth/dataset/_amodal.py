@@ -3,44 +3,52 @@
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from jaxtyping import Bool, Float32, Float64, Int32, Int64
+from jaxtyping import Bool, Float32, Float64, Int32
 
 _MARGIN = 0.01
 """Radians around the cone that holds the object."""
+_RAYS = 8000
 
 
-def covered_pixels(
+def whole_solid_angle(
     vertices: Float64[np.ndarray, "vertices 3"],
     faces: Int32[np.ndarray, "faces 3"],
     directions: Float32[np.ndarray, "n 3"],
+    weight: Float64[np.ndarray, " n"],
     seen: Bool[np.ndarray, " n"],
-) -> Int64[np.ndarray, " m"]:
-    """Return the indices of the directions in which a mesh lies, alone in the world.
+) -> float:
+    """Return the solid angle in steradians of a mesh, alone in the world.
+
+    Where it may be hidden at most 8,000 rays are cast, evenly over the pixels in question.
 
     Args:
         vertices: Relative to the camera, in the frame of the directions.
         faces: Seen from both sides.
-        directions: Of unit length.
+        directions: Of the pixels, of unit length.
+        weight: Solid angles of the pixels.
         seen: Where it is known to be visible; these count without a ray.
     """
+    total = float(weight[seen].sum())
     length = np.linalg.norm(vertices, axis=1)
     towards = vertices / np.maximum(length, 1e-9)[:, None]
     axis = towards.mean(axis=0)
     axis /= max(float(np.linalg.norm(axis)), 1e-9)
     narrowest = float((towards @ axis).min())
-    near = seen.copy()
     if narrowest > 0.05:  # a cone of less than 87 degrees holds all vertices, and so all faces
         limit = np.cos(min(np.arccos(narrowest) + _MARGIN, np.pi))
         candidates = np.flatnonzero((directions @ axis.astype(np.float32) >= limit) & ~seen)
     else:
         candidates = np.flatnonzero(~seen)
     candidates = candidates[_meets_bounds(vertices, directions[candidates])]
-    if len(candidates):
-        world = EmbreeScene(robust=True)
-        TriangleMesh(world, np.ascontiguousarray(vertices, np.float32), faces)
-        rays = np.ascontiguousarray(directions[candidates])
-        near[candidates[world.run(np.zeros_like(rays), rays) >= 0]] = True
-    return np.flatnonzero(near)
+    if len(candidates) == 0:
+        return total
+    count = len(candidates)
+    candidates = candidates[:: -(-count // _RAYS)]
+    world = EmbreeScene()
+    TriangleMesh(world, np.ascontiguousarray(vertices, np.float32), faces)
+    rays = np.ascontiguousarray(directions[candidates])
+    hit = world.run(np.zeros_like(rays), rays) >= 0
+    return total + float(weight[candidates[hit]].sum()) * count / len(candidates)
 
 
 def _meets_bounds(

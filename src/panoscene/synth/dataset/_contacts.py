@@ -6,7 +6,8 @@ from scipy.spatial import KDTree
 
 _REACH = 0.15
 """Metres around a box in which the other mesh is looked at."""
-_POINTS = 4000
+_POINTS = 1500
+_VERTICES = 1500
 
 
 def mesh_gap(
@@ -15,7 +16,7 @@ def mesh_gap(
 ) -> float:
     """Return about how far apart in metres two meshes are, given as vertices and faces.
 
-    It is the distance between the nearest of their points: vertices, and 4,000 points spread over
+    It is the distance between the nearest of their points: vertices, and 1,500 points spread over
     the part of each mesh that is near the other. Meshes farther apart than 0.15 m along an axis
     give infinity.
     """
@@ -50,7 +51,11 @@ def _near(
     fold = a + b > 1
     a, b = np.where(fold, 1 - a, a), np.where(fold, 1 - b, b)
     one, two, three = (corners[chosen, k] for k in range(3))
-    points = np.concatenate([one + a[:, None] * (two - one) + b[:, None] * (three - one),
-                             np.unique(corners.reshape(-1, 3), axis=0)])  # fmt: skip
+    # and vertices: edges and tips are where meshes meet
+    tips = vertices[np.unique(faces[meets])]
+    points = np.concatenate([
+        one + a[:, None] * (two - one) + b[:, None] * (three - one),
+        tips[:: -(-len(tips) // _VERTICES)],
+    ])  # fmt: skip
     inside = ((points >= low) & (points <= high)).all(axis=1)
     return points[inside]

@@ -1,18 +1,19 @@
 """How one camera sees one object: box, outline, what is hidden."""
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float64
+from jaxtyping import Float, Float32, Float64
 from torch import Tensor
 
 from panoscene.geometry import bfov_from_directions
 from panoscene.scene import Mesh
 from panoscene.synth.render import Camera, home_from_camera
 
-from ._amodal import covered_pixels
+from ._amodal import whole_solid_angle
 from ._hulls import hull_area
 from ._pixels import Regions, outline_directions, pixel_box, pixel_directions, pixel_solid_angle
 from ._things import Box, Thing, home_from_world, moved, tight_box
@@ -52,12 +53,10 @@ def view_of(thing: Thing, camera: Camera, regions: Regions) -> View:
     upright = upright_from_photo(camera)
     outline = outline_directions(*rows, camera.height) @ upright.T
     eye = np.array([0.0, 0.0, camera.position[2]])
-    directions = pixel_directions(camera.height, camera.width)
-    flat = _single(camera.height, camera.width)
     seen = (regions.place == region).reshape(-1)
-    covered = covered_pixels((vertices - eye) @ upright, thing.faces, flat, seen)
-    weight = pixel_solid_angle(*directions.shape[:2])
-    whole = float(weight[covered // camera.width].sum())
+    flat, weight = _pixel_lists(camera.height, camera.width)
+    local = (vertices - eye) @ upright
+    whole = whole_solid_angle(local, thing.faces, flat, weight, seen)
     cuts = (
         ("seam", bool(regions.crosses_seam[region])),
         ("zenith", int(rows[0].min()) == 0),
@@ -122,12 +121,10 @@ def canonical_mesh(view: View) -> Mesh:
     )
 
 
-_FLAT: dict[tuple[int, int], np.ndarray] = {}
-
-
-def _single(height: int, width: int) -> np.ndarray:
-    """Return the pixels' directions as one list in single precision."""
-    if (height, width) not in _FLAT:
-        _FLAT.clear()
-        _FLAT[height, width] = pixel_directions(height, width).reshape(-1, 3).astype(np.float32)
-    return _FLAT[height, width]
+@functools.lru_cache(maxsize=2)
+def _pixel_lists(
+    height: int, width: int
+) -> tuple[Float32[np.ndarray, "n 3"], Float64[np.ndarray, " n"]]:
+    """Return directions, in single precision, and solid angles of all pixels, row by row."""
+    directions = pixel_directions(height, width).reshape(-1, 3).astype(np.float32)
+    return directions, np.repeat(pixel_solid_angle(height, width), width)

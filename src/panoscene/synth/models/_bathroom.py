@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, pick
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 
@@ -30,8 +30,11 @@ def bathtub(shop: Workshop) -> None:
     }[style]
     outside = white if style != "feet" or chance(shop, 0.5) else m.paint(shop)
     base = 0.97 if style in ("built", "corner") else 0.78
-    shell = [(base * width, base * depth, lift, power), (0.985 * width, 0.985 * depth, lift + 0.8 * (height - lift), power),
-             (0.985 * width, 0.985 * depth, height - 0.03, power)]  # fmt: skip
+    shell = [
+        (base * width, base * depth, lift, power),
+        (0.985 * width, 0.985 * depth, lift + 0.8 * (height - lift), power),
+        (0.985 * width, 0.985 * depth, height - 0.03, power),
+    ]
     lower = [
         (0.93 * width, 0.93 * depth, height - 0.03, power),
         (0.93 * width * base, 0.93 * depth * base, lift + 0.02, power),
@@ -41,10 +44,18 @@ def bathtub(shop: Workshop) -> None:
         pieces.loft(np.stack([pieces.oval(w, d, z, p, 56) for w, d, z, p in [*shell, *lower]])),
     )
     rim, inner = 0.05, min(power, 5.0)
-    bowl = [(width, depth, height - 0.035, power), (width, depth, height - 0.008, power), (width - 0.02, depth - 0.02, height, power),
-            (width - 2 * rim, depth - 2 * rim, height, inner), (width - 2 * rim - 0.02, depth - 2 * rim - 0.02, height - 0.02, inner),
-            (0.72 * width, 0.66 * depth, lift + 0.14, 3.0), (0.6 * width, 0.5 * depth, lift + 0.09, 2.5),
-            (0.6 * width, 0.5 * depth, lift + 0.07, 2.5), (0.76 * width, 0.7 * depth, lift + 0.12, 3.0), (width - 2 * rim, depth - 2 * rim, height - 0.035, inner)]  # fmt: skip
+    bowl = [
+        (width, depth, height - 0.035, power),
+        (width, depth, height - 0.008, power),
+        (width - 0.02, depth - 0.02, height, power),
+        (width - 2 * rim, depth - 2 * rim, height, inner),
+        (width - 2 * rim - 0.02, depth - 2 * rim - 0.02, height - 0.02, inner),
+        (0.72 * width, 0.66 * depth, lift + 0.14, 3.0),
+        (0.6 * width, 0.5 * depth, lift + 0.09, 2.5),
+        (0.6 * width, 0.5 * depth, lift + 0.07, 2.5),
+        (0.76 * width, 0.7 * depth, lift + 0.12, 3.0),
+        (width - 2 * rim, depth - 2 * rim, height - 0.035, inner),
+    ]
     shop.add(
         white,
         pieces.loft(np.stack([pieces.oval(w, d, z, p, 56) for w, d, z, p in bowl]), joined=True),
@@ -107,8 +118,14 @@ def toilet(shop: Workshop) -> None:
         ring(0.58 * width, 0.6 * length, low + 0.08, -0.12),
         ring(0.75 * width, 0.8 * length, 0.6 * height, -0.06),
     ]
-    bowl = [ring(width, length, height - 0.04), ring(width, length, height), ring(0.74 * width, 0.78 * length, height, 0.02),
-            ring(0.6 * width, 0.6 * length, height - 0.12, 0.02), ring(0.3 * width, 0.3 * length, height - 0.2), ring(0.0, 0.0, height - 0.21)]  # fmt: skip
+    bowl = [
+        ring(width, length, height - 0.04),
+        ring(width, length, height),
+        ring(0.74 * width, 0.78 * length, height, 0.02),
+        ring(0.6 * width, 0.6 * length, height - 0.12, 0.02),
+        ring(0.3 * width, 0.3 * length, height - 0.2),
+        ring(0.0, 0.0, height - 0.21),
+    ]
     shop.add(white, pieces.loft(np.stack([*foot, *bowl])), crease=60.0)
     shop.box(
         white, (-0.36 * width, back - 0.12, low), (0.36 * width, back + 0.2, height - 0.005), 0.02
@@ -169,10 +186,22 @@ def shower(shop: Workshop) -> None:
         path = np.column_stack([ring, np.full(len(ring), low)])
         _curved_pane(shop, pane, path, height)
         _straight_pane(
-            shop, pane, chrome, (0.97 * x, -y), (0.97 * x, float(path[0, 1])), low, height
+            shop,
+            pane,
+            chrome,
+            (0.97 * x, -y),
+            (0.97 * x, float(path[0, 1])),
+            low=low,
+            height=height,
         )
         _straight_pane(
-            shop, pane, chrome, (-x, 0.97 * y), (float(path[-1, 0]), 0.97 * y), low, height
+            shop,
+            pane,
+            chrome,
+            (-x, 0.97 * y),
+            (float(path[-1, 0]), 0.97 * y),
+            low=low,
+            height=height,
         )
         for z in (low, height):
             shop.pipe(chrome, path + np.array([0, 0, z - low]), 0.013)
@@ -187,10 +216,18 @@ def shower(shop: Workshop) -> None:
         if style != "walk-in":
             for s in (-1, 1) if style == "box" else (1,):
                 _straight_pane(
-                    shop, pane, chrome, (s * (x - 0.012), -y), (s * (x - 0.012), y), low, height
+                    shop,
+                    pane,
+                    chrome,
+                    (s * (x - 0.012), -y),
+                    (s * (x - 0.012), y),
+                    low=low,
+                    height=height,
                 )
         reach = x - 0.012 if style != "walk-in" else 0.25 * x
-        _straight_pane(shop, pane, chrome, (-x + 0.012, y - 0.012), (reach, y - 0.012), low, height)
+        _straight_pane(
+            shop, pane, chrome, (-x + 0.012, y - 0.012), (reach, y - 0.012), low=low, height=height
+        )
         if style != "walk-in":
             split = pick(shop, (-0.1, 0.0, 0.2)) * x
             shop.box(
@@ -206,7 +243,7 @@ def shower(shop: Workshop) -> None:
     _riser(shop, chrome, -y, height)
 
 
-def _straight_pane(shop, pane, chrome, a, b, low, height) -> None:
+def _straight_pane(shop, pane, chrome, a, b, *, low, height) -> None:
     """Add an upright pane with rails between two places."""
     (x0, y0), (x1, y1) = a, b
     t = 0.004

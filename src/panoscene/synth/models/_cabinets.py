@@ -1,60 +1,88 @@
 """Carcasses with doors and drawers: kitchen cabinets, counters, chests, shelves."""
 
+import itertools
+
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from ._parts import HANDLES, between, chance, corners, front, handle, legs, pick
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 _STYLES = ("flat", "flat", "shaker", "raised", "grooved")
 GAP = 0.003
 
 
-def fronts(shop: Workshop, finish: Finish, grip: Finish, style: str, hold: str, x, z, y: Number,
+def fronts(shop: Workshop, finish: Finish, grip: Finish, style: str, hold: str, *, x, z, y: Number,
            plan: str, upper: bool = False) -> None:  # fmt: skip
-    """Fill an opening with fronts: ``plan`` is D (door), W (two doors), 1 to 5 (drawers), d (drawer over a door)."""
+    """Fill an opening with fronts.
+
+    The ``plan`` is D (a door), W (two doors), d (a drawer over a door) or the number of drawers.
+    """
     (x0, x1), (z0, z1) = x, z
     if plan.isdigit():
         edges = np.linspace(z0, z1, int(plan) + 1)
         if int(plan) == 3 and z1 - z0 > 0.55:
             edges = np.array([z0, z0 + 0.39 * (z1 - z0), z0 + 0.78 * (z1 - z0), z1])
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
-            top = front(shop, finish, style, (x0 + GAP, x1 - GAP), (a + GAP, b - GAP), y)
+        for a, b in itertools.pairwise(edges):
+            top = front(shop, finish, style, (x0 + GAP, x1 - GAP), (a + GAP, b - GAP), y=y)
             length = min(0.5 * (x1 - x0), 0.22)
             where = (a + b) / 2 if hold in ("knob", "cup", "bow") else b - 0.05
             spots = [-0.25, 0.25] if x1 - x0 > 0.75 and hold in ("knob", "cup") else [0.0]
             for s in spots:
-                handle(shop, grip, hold, ((x0 + x1) / 2 + s * (x1 - x0), top, where), length, False)
+                handle(
+                    shop,
+                    grip,
+                    hold,
+                    ((x0 + x1) / 2 + s * (x1 - x0), top, where),
+                    length,
+                    upright=False,
+                )
         return
     if plan == "d":
         cut = z1 - min(0.17, 0.3 * (z1 - z0))
-        fronts(shop, finish, grip, style, hold, x, (cut, z1), y, "1")
+        fronts(shop, finish, grip, style, hold, x=x, z=(cut, z1), y=y, plan="1")
         fronts(
-            shop, finish, grip, style, hold, x, (z0, cut), y, "D" if x1 - x0 < 0.62 else "W", upper
+            shop,
+            finish,
+            grip,
+            style,
+            hold,
+            x=x,
+            z=(z0, cut),
+            y=y,
+            plan="D" if x1 - x0 < 0.62 else "W",
+            upper=upper,
         )
         return
     if plan == "W":
         middle = (x0 + x1) / 2
         for k, pair in enumerate(((x0, middle), (middle, x1))):
-            _door(shop, finish, grip, style, hold, pair, z, y, bool(k == 1), upper)
+            _door(shop, finish, grip, style, hold, x=pair, z=z, y=y, left=bool(k == 1), upper=upper)
         return
-    _door(shop, finish, grip, style, hold, x, z, y, chance(shop, 0.5), upper)
+    _door(shop, finish, grip, style, hold, x=x, z=z, y=y, left=chance(shop, 0.5), upper=upper)
 
 
-def _door(shop, finish, grip, style, hold, x, z, y, left, upper) -> None:
+def _door(shop, finish, grip, style, hold, *, x, z, y, left, upper) -> None:
     pane = m.glass(shop, 0.25) if style == "glass" else None
     top = front(
-        shop, finish, style, (x[0] + GAP, x[1] - GAP), (z[0] + GAP, z[1] - GAP), y, pane=pane
+        shop, finish, style, (x[0] + GAP, x[1] - GAP), (z[0] + GAP, z[1] - GAP), y=y, pane=pane
     )
     place = x[0] + 0.035 if left else x[1] - 0.035
     height = min(z[0] + 0.12, (z[0] + z[1]) / 2) if upper else max(z[1] - 0.12, (z[0] + z[1]) / 2)
     length = float(np.clip(0.3 * (z[1] - z[0]), 0.1, 0.2))
-    handle(shop, grip, "bow" if hold == "cup" else hold, (place, top, height), length, True)
+    handle(shop, grip, "bow" if hold == "cup" else hold, (place, top, height), length, upright=True)
 
 
 def _run(
-    shop: Workshop, width: Number, depth: Number, height: Number, plinth: Number, plans, style=None
+    shop: Workshop,
+    width: Number,
+    depth: Number,
+    height: Number,
+    plinth: Number,
+    *,
+    plans,
+    style=None,
 ):
     """Add a carcass, its plinth and one column of fronts for every plan; return the finishes."""
     rng = shop.rng
@@ -71,7 +99,7 @@ def _run(
     share = np.linspace(0, 1, len(plans) + 1) if chance(shop, 0.6) else share / share[-1]
     for k, plan in enumerate(plans):
         span = (-width / 2 + width * share[k], -width / 2 + width * share[k + 1])
-        fronts(shop, face, grip, style, hold, span, (plinth, height), y, plan)
+        fronts(shop, face, grip, style, hold, x=span, z=(plinth, height), y=y, plan=plan)
     return shell, face
 
 
@@ -81,7 +109,7 @@ def _plans(shop: Workshop, width: Number, options: str = "DdW13422") -> list[str
 
 
 def _slab(
-    shop: Workshop, width: Number, depth: Number, height: Number, thick: Number, over: Number
+    shop: Workshop, width: Number, depth: Number, height: Number, thick: Number, *, over: Number
 ):
     kind = pick(shop, ("stone", "wood", "plain"), (0.5, 0.3, 0.2))
     top = {"stone": m.stone, "wood": m.wood, "plain": m.paint}[kind](shop)
@@ -99,7 +127,9 @@ def bottom_cabinet(shop: Workshop) -> None:
             between(shop, 0.55, 0.65),
             between(shop, 1.8, 2.3),
         )
-        _run(shop, width, depth, height, between(shop, 0.04, 0.1), _plans(shop, width, "DDWd"))
+        _run(
+            shop, width, depth, height, between(shop, 0.04, 0.1), plans=_plans(shop, width, "DDWd")
+        )
         shop.support = None
         return
     if use == "sideboard":
@@ -109,7 +139,7 @@ def bottom_cabinet(shop: Workshop) -> None:
             between(shop, 0.55, 0.85),
         )
         lift = between(shop, 0.1, 0.2)
-        shell, _ = _run(shop, width, depth, height, 0.0, _plans(shop, width))
+        shell, _ = _run(shop, width, depth, height, 0.0, plans=_plans(shop, width))
         foot = m.metal(shop) if chance(shop, 0.4) else shell
         shop.shift_all((0.0, 0.0, lift))
         legs(
@@ -118,7 +148,7 @@ def bottom_cabinet(shop: Workshop) -> None:
             pick(shop, ("splayed", "square", "round")),
             corners(width, depth, 0.07),
             lift,
-            0.045,
+            thick=0.045,
         )
         shop.support = height + lift
         return
@@ -127,15 +157,15 @@ def bottom_cabinet(shop: Workshop) -> None:
         between(shop, 0.56, 0.62),
         between(shop, 0.8, 0.86),
     )
-    _run(shop, width, depth, height, 0.1, _plans(shop, width))
-    _slab(shop, width, depth, height, between(shop, 0.025, 0.045), 0.0)
+    _run(shop, width, depth, height, 0.1, plans=_plans(shop, width))
+    _slab(shop, width, depth, height, between(shop, 0.025, 0.045), over=0.0)
 
 
 def bottom_cabinet_no_top(shop: Workshop) -> None:
     """Make a base unit without worktop."""
     width = between(shop, 0.3, 1.2)
     height = between(shop, 0.7, 0.86)
-    _run(shop, width, between(shop, 0.5, 0.6), height, 0.1, _plans(shop, width))
+    _run(shop, width, between(shop, 0.5, 0.6), height, 0.1, plans=_plans(shop, width))
     shop.support = height
 
 
@@ -162,8 +192,8 @@ def top_cabinet(shop: Workshop) -> None:
     else:
         shop.box(shell, (-width / 2, -depth / 2, 0), (width / 2, y - 0.001, height))
     edges = np.linspace(-width / 2, width / 2, max(1, round(width / between(shop, 0.38, 0.6))) + 1)
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
-        fronts(shop, face, grip, style, hold, (a, b), (0, height), y, "D", upper=True)
+    for a, b in itertools.pairwise(edges):
+        fronts(shop, face, grip, style, hold, x=(a, b), z=(0, height), y=y, plan="D", upper=True)
     if chance(shop, 0.3):
         shop.box(
             shell,
@@ -180,8 +210,8 @@ def counter(shop: Workshop) -> None:
     height = between(shop, 0.82, 0.9)
     if chance(shop, 0.25):
         height += 0.14
-    _run(shop, width, depth, height, 0.1, _plans(shop, width))
-    _slab(shop, width, depth, height, between(shop, 0.03, 0.06), between(shop, 0.0, 0.04))
+    _run(shop, width, depth, height, 0.1, plans=_plans(shop, width))
+    _slab(shop, width, depth, height, between(shop, 0.03, 0.06), over=between(shop, 0.0, 0.04))
     if chance(shop, 0.35):
         rail = m.metal(shop)
         y, z = depth / 2 + 0.07, 0.2
@@ -199,7 +229,13 @@ def chest(shop: Workshop) -> None:
     lift = between(shop, 0.04, 0.2)
     plans = [pick(shop, "123" if small else "345")] * (2 if width > 0.95 else 1)
     shell, _ = _run(
-        shop, width, depth, height, 0.0, plans, pick(shop, ("flat", "shaker", "raised", "flat"))
+        shop,
+        width,
+        depth,
+        height,
+        0.0,
+        plans=plans,
+        style=pick(shop, ("flat", "shaker", "raised", "flat")),
     )
     shop.box(
         shell,
@@ -214,7 +250,7 @@ def chest(shop: Workshop) -> None:
         pick(shop, ("splayed", "square", "turned", "round")),
         corners(width, depth, 0.045),
         lift,
-        0.05,
+        thick=0.05,
     )
     shop.support = height + 0.022 + lift
 
@@ -229,7 +265,7 @@ def shelf(shop: Workshop) -> None:
     board, frame = m.body(shop), m.metal(shop)
     style, levels = (
         pick(shop, ("case", "rack", "ladder", "grid")),
-        int(round(height / between(shop, 0.3, 0.42))) + 1,
+        round(height / between(shop, 0.3, 0.42)) + 1,
     )
     z = np.linspace(0.06, height - 0.02, max(levels, 3))
     t, x, y = 0.022, width / 2, depth / 2
@@ -283,17 +319,17 @@ def console_table(shop: Workshop) -> None:
             (width / 2 - 0.03, depth / 2 - 0.038, height - 0.028),
         )
         edges = np.linspace(-width / 2 + 0.03, width / 2 - 0.03, int(shop.rng.integers(2, 4)))
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             fronts(
                 shop,
                 face,
                 frame,
                 "flat",
                 pick(shop, ("knob", "cup", "bow")),
-                (a, b),
-                (low, height - 0.03),
-                depth / 2 - 0.038,
-                "1",
+                x=(a, b),
+                z=(low, height - 0.03),
+                y=depth / 2 - 0.038,
+                plan="1",
             )
         legs(
             shop,
@@ -301,7 +337,7 @@ def console_table(shop: Workshop) -> None:
             pick(shop, ("turned", "square", "round")),
             corners(width, depth, 0.055),
             low,
-            0.045,
+            thick=0.045,
         )
     elif style == "hoops":
         for x in (-width / 2 + 0.08, width / 2 - 0.08):
@@ -311,7 +347,7 @@ def console_table(shop: Workshop) -> None:
                 (x, depth / 2 - 0.03, 0.012),
                 (x, depth / 2 - 0.03, height - 0.03),
             ]
-            for a, b in zip(path[:-1], path[1:], strict=True):
+            for a, b in itertools.pairwise(path):
                 shop.rod(frame, a, b, 0.012)
     else:
         legs(
@@ -320,7 +356,7 @@ def console_table(shop: Workshop) -> None:
             "square",
             corners(width, depth, 0.03),
             height - 0.028,
-            0.03 if style == "metal" else 0.05,
+            thick=0.03 if style == "metal" else 0.05,
         )
     if style != "hoops" and chance(shop, 0.6):
         z = between(shop, 0.12, 0.25)

@@ -11,10 +11,13 @@ from panoscene.synth.assets import CadModel, Placement
 from . import _appliances as machines
 from . import _bathroom as bath
 from . import _cabinets as cabinets
+from . import _clocks as clocks
+from . import _cooking as cooking
 from . import _decoration as deco
 from . import _electronics as screens
 from . import _hobby as hobby
 from . import _lamps as lamps
+from . import _openings as openings
 from . import _seats as seats
 from . import _soft as soft
 from . import _vessels as vessels
@@ -41,46 +44,46 @@ _LABELLED: dict[str, Kind] = {
     "chest": Kind(cabinets.chest),
     "coffee_machine": Kind(machines.coffee_machine, "on_top"),
     "console_table": Kind(cabinets.console_table),
-    "cooktop": Kind(machines.cooktop, "on_top"),
+    "cooktop": Kind(cooking.cooktop, "on_top"),
     "counter": Kind(cabinets.counter),
     "crib": Kind(vessels.crib),
     "cushion": Kind(soft.cushion, "on_top"),
     "dishwasher": Kind(machines.dishwasher),
-    "door": Kind(wall.door, "in_wall"),
+    "door": Kind(openings.door, "in_wall"),
     "dryer": Kind(machines.dryer),
     "fence": Kind(vessels.fence, has_front=False),
     "floor_lamp": Kind(lamps.floor_lamp, has_front=False),
     "fridge": Kind(machines.fridge),
-    "grandfather_clock": Kind(wall.grandfather_clock),
+    "grandfather_clock": Kind(clocks.grandfather_clock),
     "guitar": Kind(hobby.guitar),
     "heater": Kind(wall.heater, "wall", 0.12),
     "laptop": Kind(screens.laptop, "on_top"),
     "loudspeaker": Kind(screens.loudspeaker),
-    "microwave": Kind(machines.microwave, "on_top"),
+    "microwave": Kind(cooking.microwave, "on_top"),
     "mirror": Kind(wall.mirror, "wall", 1.0),
     "monitor": Kind(screens.monitor, "on_top"),
     "office_chair": Kind(seats.office_chair),
-    "oven": Kind(machines.oven, elevation=0.15),
+    "oven": Kind(cooking.oven, elevation=0.15),
     "piano": Kind(hobby.piano),
     "picture": Kind(wall.picture, "wall", 1.3),
     "pool_table": Kind(hobby.pool_table, has_front=False),
-    "range_hood": Kind(machines.range_hood, "wall", 1.55),
+    "range_hood": Kind(cooking.range_hood, "wall", 1.55),
     "shelf": Kind(cabinets.shelf),
     "shower": Kind(bath.shower),
     "speaker_system": Kind(screens.speaker_system, "on_top"),
     "standing_tv": Kind(screens.standing_tv, "on_top"),
     "stool": Kind(seats.stool, has_front=False),
-    "stove": Kind(machines.stove),
+    "stove": Kind(cooking.stove),
     "table_lamp": Kind(lamps.table_lamp, "on_top", has_front=False),
     "toilet": Kind(bath.toilet),
     "top_cabinet": Kind(cabinets.top_cabinet, "wall", 1.45),
     "towel_rack": Kind(wall.towel_rack, "wall", 1.0),
     "trash_can": Kind(vessels.trash_can, has_front=False),
     "treadmill": Kind(hobby.treadmill),
-    "wall_clock": Kind(wall.wall_clock, "wall", 1.7),
+    "wall_clock": Kind(clocks.wall_clock, "wall", 1.7),
     "wall_mounted_tv": Kind(screens.wall_mounted_tv, "wall", 1.0),
     "washer": Kind(machines.washer),
-    "window": Kind(wall.window, "in_wall", 0.9),
+    "window": Kind(openings.window, "in_wall", 0.9),
 }
 _DECORATION: dict[str, Kind] = {
     "books": Kind(deco.books, "on_top"),

@@ -1,16 +1,18 @@
 """Screens, computers and loudspeakers."""
 
+import itertools
+
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, pick
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 
 def _panel(
-    shop: Workshop, width: Number, height: Number, low: Number, lit: Number, kind: str
+    shop: Workshop, width: Number, height: Number, low: Number, lit: Number, *, kind: str
 ) -> Finish:
     """Add a flat screen around x = y = 0 with its lower edge at ``low``; return its casing."""
     case = m.black(shop) if chance(shop, 0.75) else m.silver(shop)
@@ -36,7 +38,7 @@ def monitor(shop: Workshop) -> None:
     width = between(shop, 0.46, 0.72)
     height = width * pick(shop, (0.5625, 0.5625, 0.625, 0.43))
     low = between(shop, 0.09, 0.16)
-    case = _panel(shop, width, height, low, 0.6, "screen_desktop")
+    case = _panel(shop, width, height, low, 0.6, kind="screen_desktop")
     foot = case if chance(shop, 0.6) else m.silver(shop)
     style = pick(shop, ("plate", "disc", "vee"))
     if style == "plate":
@@ -83,7 +85,7 @@ def standing_tv(shop: Workshop) -> None:
         return
     width, height = _tv_size(shop)
     low = between(shop, 0.05, 0.1)
-    case = _panel(shop, width, height, low, 0.3, "screen_film")
+    case = _panel(shop, width, height, low, 0.3, kind="screen_film")
     style = pick(shop, ("feet", "plate", "bar"))
     if style == "feet":
         for s in (-1, 1):
@@ -100,7 +102,7 @@ def standing_tv(shop: Workshop) -> None:
 def wall_mounted_tv(shop: Workshop) -> None:
     """Make a television on a wall bracket."""
     width, height = _tv_size(shop)
-    _panel(shop, width, height, 0.0, 0.3, "screen_film")
+    _panel(shop, width, height, 0.0, 0.3, kind="screen_film")
     shop.box(m.black(shop), (-0.15, -0.09, 0.3 * height), (0.15, -0.02, 0.7 * height), 0.004)
     if chance(shop, 0.3):
         shop.box(m.black(shop), (-0.4 * width, -0.05, -0.14), (0.4 * width, 0.04, -0.06), 0.015)
@@ -233,7 +235,7 @@ def speaker_system(shop: Workshop) -> None:
             (0.4 * width, 0, height + 0.05),
             (0.4 * width, 0, height - 0.01),
         ]
-        for a, b in zip(path[:-1], path[1:], strict=True):
+        for a, b in itertools.pairwise(path):
             shop.rod(m.silver(shop), a, b, 0.008)
         return
     case, unit = m.body(shop), m.silver(shop)

@@ -1,13 +1,15 @@
 """Pool tables, treadmills, guitars, pianos."""
 
+import itertools
+
 import numpy as np
 
 from panoscene.synth.textures import palette
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, corners, legs, pick
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 
@@ -42,7 +44,7 @@ def pool_table(shop: Workshop) -> None:
     spots = corners(width, depth, 0.2)
     if chance(shop, 0.5):
         spots += [(0.0, -y + 0.2), (0.0, y - 0.2)]
-    legs(shop, timber, style, spots, height - 0.2, between(shop, 0.11, 0.16))
+    legs(shop, timber, style, spots, height - 0.2, thick=between(shop, 0.11, 0.16))
     _balls(shop, x, y, rail, height)
     shop.support = height - 0.04
     shop.has_front = False
@@ -231,7 +233,7 @@ def _guitar_stand(shop: Workshop, deep: Number) -> None:
             (s * 0.11, deep + 0.06, 0.085),
             (s * 0.11, deep + 0.07, 0.13),
         ]
-        for a, b in zip(arm[:-1], arm[1:], strict=True):
+        for a, b in itertools.pairwise(arm):
             shop.rod(dark, a, b, 0.008)
     shop.rod(dark, (0, back, 0.05), (0, back - 0.16, 0.008), 0.009)
 
@@ -362,7 +364,7 @@ def _grand(shop: Workshop, gloss: Finish, width: Number, length: Number) -> None
     if chance(shop, 0.7):
         shop.box(gloss, (-0.33, y - 0.38, top), (0.33, y - 0.36, top + 0.2), 0.003)
     for spot in ((0.42 * width, y - 0.25), (-0.42 * width, y - 0.25), (0.1 * width, -0.6 * y)):
-        legs(shop, gloss, "turned", [spot], low, 0.1)
+        legs(shop, gloss, "turned", [spot], low, thick=0.1)
     brass = m.plain("metal brass", (0.78, 0.6, 0.3), 0.2, 1.0)
     shop.box(gloss, (-0.1, y - 0.42, 0.1), (0.1, y - 0.36, low), 0.005)
     for x in (-0.06, 0, 0.06):

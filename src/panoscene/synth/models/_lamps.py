@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, pick
+from ._pieces import Number
 from ._workshop import Workshop
 
 
 def _shade(
-    shop: Workshop, z: Number, low: Number, high: Number, height: Number, at=(0.0, 0.0)
+    shop: Workshop, z: Number, low: Number, high: Number, height: Number, *, at=(0.0, 0.0)
 ) -> None:
     """Add an open shade from ``z`` upwards with a bulb inside."""
     wall, cloth = 0.003, m.glow(shop)
@@ -141,7 +141,7 @@ def floor_lamp(shop: Workshop) -> None:
 
 
 def table_lamp(shop: Workshop) -> None:
-    """Make a table lamp: pottery or turned foot with a shade, a globe, a mushroom or a desk lamp."""
+    """Make a table lamp: a foot with a shade, a globe, a mushroom or a desk lamp."""
     style, height = (
         pick(shop, ("vase", "vase", "turned", "globe", "mushroom", "desk")),
         between(shop, 0.34, 0.6),

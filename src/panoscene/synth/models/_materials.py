@@ -201,10 +201,10 @@ def display(shop: Workshop) -> Finish:
     return textured(shop, "controls", "screen", whole=True)
 
 
-def mean_colour(finish: Finish) -> np.ndarray:
-    """Return the finish's mean sRGB colour."""
+def mean_colour(finish: Finish, factor: Number = 1.0) -> Colour:
+    """Return the finish's mean sRGB colour, darkened by a factor."""
     material = finish.material
-    shade = np.asarray(material.colour)
+    shade = np.asarray(material.colour) * factor
     if material.texture is not None:
         shade = shade * material.texture.reshape(-1, 3).mean(axis=0) / 255.0
-    return shade
+    return float(shade[0]), float(shade[1]), float(shade[2])

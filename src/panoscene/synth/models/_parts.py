@@ -1,11 +1,12 @@
 """Parts that many models share: handles, fronts, legs, feet, knobs."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
-from ._pieces import Number
 from . import _pieces as pieces
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 HANDLES = ("bar", "bow", "knob", "cup", "edge", "none")
@@ -27,7 +28,9 @@ def chance(shop: Workshop, share: Number) -> bool:
     return bool(shop.rng.random() < share)
 
 
-def handle(shop: Workshop, finish: Finish, style: str, at, length: Number, upright: bool) -> None:
+def handle(
+    shop: Workshop, finish: Finish, style: str, at, length: Number, *, upright: bool
+) -> None:
     """Add a handle on a front whose surface is at ``at[1]``; it stands out towards +y."""
     x, y, z = at
     reach, half = 0.032, length / 2
@@ -55,8 +58,17 @@ def handle(shop: Workshop, finish: Finish, style: str, at, length: Number, uprig
         shop.box(finish, low, high, 0.002)
 
 
-def front(shop: Workshop, finish: Finish, style: str, x: tuple[Number, Number], z: tuple[Number, Number],
-          y: Number, thick: Number = 0.018, pane: Finish | None = None) -> float:  # fmt: skip
+def front(
+    shop: Workshop,
+    finish: Finish,
+    style: str,
+    x: tuple[Number, Number],
+    z: tuple[Number, Number],
+    *,
+    y: Number,
+    thick: Number = 0.018,
+    pane: Finish | None = None,
+) -> float:
     """Add a door or drawer front on the plane ``y``; return the y of its surface."""
     (x0, x1), (z0, z1) = x, z
     if style == "flat" or min(x1 - x0, z1 - z0) < 0.14:
@@ -64,26 +76,42 @@ def front(shop: Workshop, finish: Finish, style: str, x: tuple[Number, Number], 
     elif style == "grooved":
         count = max(2, round((x1 - x0) / 0.09))
         edges = np.linspace(x0, x1, count + 1)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             shop.box(finish, (a, y, z0), (b, y + thick, z1), 0.003)
     else:
         rail = min(0.06, 0.25 * (x1 - x0), 0.25 * (z1 - z0))
-        profile = [(0, 0), (0, thick - 0.002), (0.002, thick), (rail - 0.006, thick),
-                   (rail, thick - 0.007), (rail, 0)]  # fmt: skip
+        profile = [
+            (0, 0),
+            (0, thick - 0.002),
+            (0.002, thick),
+            (rail - 0.006, thick),
+            (rail, thick - 0.007),
+            (rail, 0),
+        ]
         frame = pieces.moulding(x1 - x0, z1 - z0, profile)
         shop.add(finish, frame, ((x0 + x1) / 2, y, (z0 + z1) / 2), crease=30.0)
         depth = 0.004 if style == "glass" else thick - 0.009
         fill = pane if style == "glass" and pane is not None else finish
-        shop.box(fill, (x0 + rail - 0.004, y + 0.001, z0 + rail - 0.004),
-                 (x1 - rail + 0.004, y + 0.001 + depth, z1 - rail + 0.004), 0.001)  # fmt: skip
+        shop.box(
+            fill,
+            (x0 + rail - 0.004, y + 0.001, z0 + rail - 0.004),
+            (x1 - rail + 0.004, y + 0.001 + depth, z1 - rail + 0.004),
+            0.001,
+        )
         if style == "raised":
             inset = rail + 0.03
-            shop.box(finish, (x0 + inset, y + 0.002, z0 + inset),
-                     (x1 - inset, y + thick - 0.001, z1 - inset), 0.006)  # fmt: skip
+            shop.box(
+                finish,
+                (x0 + inset, y + 0.002, z0 + inset),
+                (x1 - inset, y + thick - 0.001, z1 - inset),
+                0.006,
+            )
     return y + thick
 
 
-def legs(shop: Workshop, finish: Finish, style: str, spots, height: Number, thick: Number) -> None:
+def legs(
+    shop: Workshop, finish: Finish, style: str, spots, height: Number, *, thick: Number
+) -> None:
     """Add a leg below every (x, y) spot, up to ``height``."""
     centre = np.mean(np.asarray(spots), axis=0)
     for x, y in spots:
@@ -97,8 +125,19 @@ def legs(shop: Workshop, finish: Finish, style: str, spots, height: Number, thic
             shop.rod(finish, foot, (x, y, height), 0.28 * thick, 0.5 * thick)
         elif style == "turned":
             r = thick / 2
-            profile = [(0, 0), (0.6 * r, 0), (0.8 * r, 0.05), (0.45 * r, 0.09), (0.95 * r, 0.3),
-                       (0.7 * r, 0.62), (1.0 * r, 0.68), (0.6 * r, 0.74), (r, 0.8), (r, 1), (0, 1)]  # fmt: skip
+            profile = [
+                (0, 0),
+                (0.6 * r, 0),
+                (0.8 * r, 0.05),
+                (0.45 * r, 0.09),
+                (0.95 * r, 0.3),
+                (0.7 * r, 0.62),
+                (1.0 * r, 0.68),
+                (0.6 * r, 0.74),
+                (r, 0.8),
+                (r, 1),
+                (0, 1),
+            ]
             shop.add(finish, pieces.lathe([(q, s * height) for q, s in profile], 20), (x, y, 0))
         else:
             shop.disc(finish, (x, y, 0), 0.35 * thick, height, 0.45 * thick)

@@ -51,14 +51,15 @@ def turn(piece: Piece, axis: str, angle: Number) -> Piece:
 
 
 def _box_faces() -> Int[np.ndarray, "44 3"]:
-    """Return the triangles of a bevelled box; vertex 8 a + corner lies on its face across axis a."""
+    """Return the triangles of a bevelled box; vertex 8 a + corner is on the face across axis a."""
     corner = np.array([[(k >> b) & 1 for b in range(3)] for k in range(8)]) * 2.0 - 1.0
     points = np.concatenate([np.where(np.eye(3)[a] > 0, 1.0, 0.9) * corner for a in range(3)])
     quads, triangles = [], []
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        for s in (0, 1 << a):
-            quads.append([8 * a + s + k for k in (0, 1 << b, (1 << b) | (1 << c), 1 << c)])
+        quads += [
+            [8 * a + s + k for k in (0, 1 << b, (1 << b) | (1 << c), 1 << c)] for s in (0, 1 << a)
+        ]
         for s in (0, 1 << b):
             for r in (0, 1 << c):
                 low, high = s + r, s + r + (1 << a)
@@ -215,10 +216,7 @@ def tube(
 ):
     """Return a round rod along a path; the radius may be one number or one for every point."""
     p = np.asarray(path, float)
-    if joined:
-        tangent = np.roll(p, -1, 0) - np.roll(p, 1, 0)
-    else:
-        tangent = np.gradient(p, axis=0)
+    tangent = np.roll(p, -1, 0) - np.roll(p, 1, 0) if joined else np.gradient(p, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     first = np.eye(3)[int(np.argmin(np.abs(tangent[0])))]
     normals = [first - tangent[0] * (first @ tangent[0])]

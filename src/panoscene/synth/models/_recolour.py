@@ -1,6 +1,7 @@
 """New looks for the materials of a model, by what they are made of."""
 
 import colorsys
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ Colour = tuple[float, float, float]
 _WORDS = {
     "wood": ("wood", "oak", "walnut", "pine", "birch", "beech", "timber", "holz", "cherry", "teak"),
     "leather": ("leather", "leder", "cuir"),
-    "fabric": ("fabric", "cloth", "cushion", "textile", "sofa", "linen", "cotton", "seat", "fleece"),
+    "fabric": ("fabric", "cloth", "cushion", "textile", "sofa", "linen", "cotton", "fleece"),
     "metal": ("metal", "chrome", "steel", "alu", "iron", "brass", "silver", "inox", "nickel"),
     "paint": ("paint", "enamel", "glaze", "plastic", "lacquer", "toy"),
     "picture": ("picture",),
@@ -37,18 +38,27 @@ _METALS: tuple[tuple[Colour, float, float], ...] = (
 )  # fmt: skip
 
 
-def _family(material: Material, category: str, share: float) -> str:
-    """Return what a material is made of, by its name, else by the model's category."""
-    name = material.name.lower()
-    if material.kind != "opaque" or category in _KEPT_CATEGORIES:
-        return "kept"
-    first = name.split(" ", maxsplit=1)[0] if name else ""
+def _named_family(name: str) -> str | None:
+    """Return what a material's name says of it; our own names begin with the family."""
+    first = name.split(" ", maxsplit=1)[0]
     for family, words in _WORDS.items():
         if first == family or first in words:
             return family
-    for family in ("kept", "leather", "wood", "fabric", "metal"):
+    if set(re.split(r"[^a-z]+", name)) & set(_WORDS["kept"]):
+        return "kept"
+    for family in ("leather", "wood", "fabric", "metal"):
         if any(word in name for word in _WORDS[family]):
             return family
+    return None
+
+
+def _family(material: Material, category: str, share: float) -> str:
+    """Return what a material is made of, by its name, else by the model's category."""
+    if material.kind != "opaque" or category in _KEPT_CATEGORIES:
+        return "kept"
+    named = _named_family(material.name.lower())
+    if named is not None:
+        return named
     hue, light, saturation = colorsys.rgb_to_hls(*material.colour)
     if share > 0.2 and category in _WOODEN and 0.03 < hue < 0.14 and saturation > 0.15:
         return "wood"

@@ -1,11 +1,13 @@
 """Office chairs, stools, benches."""
 
+import itertools
+
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, corners, legs, pick
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 
@@ -33,12 +35,12 @@ def office_chair(shop: Workshop) -> None:
         0.035,
         (0, 0.02, 0.012),
     )
-    _back(shop, frame, cloth, width, depth, seat_z, tall)
+    _back(shop, frame, cloth, width, depth, seat_z=seat_z, tall=tall)
     if chance(shop, 0.75):
         for s in (-1, 1):
             x, y = s * (width / 2 + 0.035), 0.02
             path = [(s * 0.12, y, seat_z - 0.05), (x, y, seat_z - 0.05), (x, y, seat_z + 0.17)]
-            for a, b in zip(path[:-1], path[1:], strict=True):
+            for a, b in itertools.pairwise(path):
                 shop.rod(frame, a, b, 0.014)
             shop.soft(
                 m.black(shop),
@@ -49,7 +51,7 @@ def office_chair(shop: Workshop) -> None:
     shop.support = None
 
 
-def _back(shop: Workshop, frame: Finish, cloth: Finish, width, depth, seat_z, tall) -> None:
+def _back(shop: Workshop, frame: Finish, cloth: Finish, width, depth, *, seat_z, tall) -> None:
     """Add a backrest: padded, in ribs, or a net with a head rest."""
     style, low = pick(shop, ("pad", "ribs", "net")), seat_z + (0.14 if tall < 0.5 else 0.05)
     y = -depth / 2 - 0.03
@@ -123,7 +125,7 @@ def stool(shop: Workshop) -> None:
                 0.05,
                 (0, 0, 0.02),
             )
-            legs(shop, timber, "square", corners(1.2 * width, 1.2 * width, 0.06), 0.05, 0.04)
+            legs(shop, timber, "square", corners(1.2 * width, 1.2 * width, 0.06), 0.05, thick=0.04)
         shop.support = 0.9 * height
         return
     thick = 0.035
@@ -137,7 +139,7 @@ def stool(shop: Workshop) -> None:
             pick(shop, ("square", "turned", "splayed")),
             corners(width, width, 0.035),
             height - thick,
-            0.042,
+            thick=0.042,
         )
     elif style == "bar" and chance(shop, 0.5):
         shop.disc(metal, (0, 0, 0), 0.21, 0.02, 0.19)
@@ -160,7 +162,7 @@ def stool(shop: Workshop) -> None:
         spots = [
             (reach * np.cos(t), reach * np.sin(t)) for t in np.pi / 4 + np.arange(4) * np.pi / 2
         ]
-        legs(shop, leg, "splayed", spots, height - thick, 0.045)
+        legs(shop, leg, "splayed", spots, height - thick, thick=0.045)
         z, lean = between(shop, 0.3, 0.45) * height, 1.0
         ring = [
             (
@@ -232,7 +234,7 @@ def bench(shop: Workshop) -> None:
         pick(shop, ("square", "turned", "splayed")),
         corners(width, depth, 0.07),
         top,
-        0.055,
+        thick=0.055,
     )
     if leg is timber and chance(shop, 0.6):
         shop.box(timber, (-x + 0.08, -0.02, 0.12), (x - 0.08, 0.02, 0.17), 0.003)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, pick
+from ._pieces import Number
 from ._workshop import Workshop
 
 
@@ -66,7 +66,7 @@ def cushion(shop: Workshop) -> None:
     piece = pieces.pillow(width, height, thick, between(shop, 0.03, 0.09))
     shop.add(cloth, piece, crease=75.0)
     if chance(shop, 0.35):
-        trim = m.plain("fabric piping", tuple(float(c) for c in 0.5 * m.mean_colour(cloth)), 0.9)
+        trim = m.plain("fabric piping", m.mean_colour(cloth, 0.5), 0.9)
         seam = np.abs(piece.vertices[:, 1]) < 1e-9
         rim = piece.vertices[seam]
         order = np.argsort(np.arctan2(rim[:, 2], rim[:, 0]))
@@ -106,10 +106,10 @@ def curtain(shop: Workshop) -> None:
         "drawn": [(-0.5, 0.0), (0.0, 0.5)],
     }[style]
     for a, b in spans:
-        _folds(shop, cloth, a * width, b * width, between(shop, 0.02, 0.15), top)
+        _folds(shop, cloth, a * width, b * width, between(shop, 0.02, 0.15), high=top)
 
 
-def _folds(shop: Workshop, cloth, x0: Number, x1: Number, low: Number, high: Number) -> None:
+def _folds(shop: Workshop, cloth, x0: Number, x1: Number, low: Number, *, high: Number) -> None:
     """Add hanging cloth in folds between two places on the rod."""
     count = max(24, int((x1 - x0) / 0.012))
     x, phase = np.linspace(x0, x1, count), between(shop, 0, 6.0)

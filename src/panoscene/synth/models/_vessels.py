@@ -2,33 +2,27 @@
 
 import numpy as np
 
-from ._pieces import Number
 from . import _materials as m
 from . import _pieces as pieces
 from ._parts import between, chance, pick
+from ._pieces import Number
 from ._workshop import Finish, Workshop
 
 
 def _open(
-    shop: Workshop, finish: Finish, low, high, height, wall, power, depth=1.0, belly=0.0
+    shop: Workshop, finish: Finish, low, high, height, *, wall, power, depth=1.0, belly=0.0
 ) -> None:
     """Add an open vessel: outline ``low`` wide at the foot and ``high`` wide at the rim."""
-    levels, rings = np.linspace(0, 1, 7), []
+    levels = np.linspace(0, 1, 7)
 
-    def wide(t: Number) -> float:
-        return low + (high - low) * t + belly * np.sin(np.pi * t) * high
+    def ring(t: Number, z: Number, inset: Number = 0.0) -> np.ndarray:
+        wide = low + (high - low) * t + belly * np.sin(np.pi * t) * high
+        return pieces.oval(wide - inset, wide * depth - inset, z, power, 48)
 
-    for t in levels:
-        rings.append(pieces.oval(wide(t), wide(t) * depth, t * height, power, 48))
-    rim = wide(1.0) + 0.6 * wall
-    rings.append(pieces.oval(rim, rim * depth, height + 0.3 * wall, power, 48))
-    for t in levels[::-1][:-1]:
-        rings.append(
-            pieces.oval(
-                wide(t) - 2 * wall, wide(t) * depth - 2 * wall, max(t * height, wall), power, 48
-            )
-        )
-    rings.append(pieces.oval(low - 2 * wall, low * depth - 2 * wall, wall, power, 48))
+    outside = [ring(t, t * height) for t in levels]
+    rim = ring(1.0, height + 0.3 * wall, -0.6 * wall)
+    inside = [ring(t, max(t * height, wall), 2 * wall) for t in levels[::-1]]
+    rings = [*outside, rim, *inside]
     shop.add(finish, pieces.loft(np.stack(rings)), crease=60.0)
 
 
@@ -54,10 +48,10 @@ def basket(shop: Workshop) -> None:
         taper * width,
         width,
         height,
-        0.012,
-        power,
-        depth,
-        0.06 if style in ("round", "bowl") else 0.0,
+        wall=0.012,
+        power=power,
+        depth=depth,
+        belly=0.06 if style in ("round", "bowl") else 0.0,
     )
     rim = pieces.oval(width + 0.01, (width + 0.01) * depth, height, power, 56)
     shop.pipe(cane, rim, 0.011, True)
@@ -90,7 +84,16 @@ def basket(shop: Workshop) -> None:
         shop.add(cane, pieces.superellipsoid((0.05, 0.05, 0.04), steps=8), (0, 0, height + 0.07))
     elif chance(shop, 0.5):
         cloth = m.fabric(shop)
-        _open(shop, cloth, taper * width - 0.03, width - 0.02, height + 0.015, 0.005, power, depth)
+        _open(
+            shop,
+            cloth,
+            taper * width - 0.03,
+            width - 0.02,
+            height + 0.015,
+            wall=0.005,
+            power=power,
+            depth=depth,
+        )
         fill = pieces.superellipsoid((0.8 * width, 0.8 * width * depth, 0.5 * height), 3.0, power)
         shop.add(m.fabric(shop), fill, (0, 0, 0.62 * height), crease=70.0)
 
@@ -106,10 +109,12 @@ def trash_can(shop: Workshop) -> None:
     dark, power = m.black(shop), 6.0 if style in ("square", "swing") else 2.0
     shop.has_front = style in ("pedal", "swing")
     if style == "open":
-        _open(shop, coat, 0.78 * width, width, height, 0.006, pick(shop, (2.0, 6.0)))
+        _open(shop, coat, 0.78 * width, width, height, wall=0.006, power=pick(shop, (2.0, 6.0)))
         if chance(shop, 0.5):
             bag = m.plain("bag", (0.9, 0.9, 0.92), 0.4)
-            _open(shop, bag, 0.78 * width - 0.02, width - 0.004, height + 0.012, 0.003, 2.0)
+            _open(
+                shop, bag, 0.78 * width - 0.02, width - 0.004, height + 0.012, wall=0.003, power=2.0
+            )
         return
     rings = [
         pieces.oval(s * width, s * width, z, power, 48)
@@ -205,7 +210,7 @@ def crib(shop: Workshop) -> None:
             [(-x + post, sy * (y - 0.02)), (x - post, sy * (y - 0.02))],
             low - 0.08,
             height - 0.03,
-            style,
+            style=style,
         )
     for sx in (-1, 1):
         if solid:
@@ -222,7 +227,7 @@ def crib(shop: Workshop) -> None:
                 [(sx * (x - 0.02), -y + post), (sx * (x - 0.02), y - post)],
                 low - 0.08,
                 height - 0.03,
-                style,
+                style=style,
             )
     shop.box(timber, (-x + 0.03, -y + 0.03, low - 0.04), (x - 0.03, y - 0.03, low - 0.02))
     white = m.plain("fabric sheet", (0.93, 0.92, 0.9), 0.95)
@@ -241,7 +246,14 @@ def crib(shop: Workshop) -> None:
 
 
 def _bars(
-    shop: Workshop, finish: Finish, line, low: Number, high: Number, style: str, gap: Number = 0.085
+    shop: Workshop,
+    finish: Finish,
+    line,
+    low: Number,
+    high: Number,
+    *,
+    style: str,
+    gap: Number = 0.085,
 ):
     """Add a row of upright bars with rails above and below between two places."""
     (x0, y0), (x1, y1) = line
@@ -319,6 +331,6 @@ def fence(shop: Workshop) -> None:
             [(-x, 0.0), (x, 0.0)],
             0.08,
             height - 0.03,
-            pick(shop, ("square", "round")),
-            0.1,
+            style=pick(shop, ("square", "round")),
+            gap=0.1,
         )

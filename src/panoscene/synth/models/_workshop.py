@@ -1,5 +1,6 @@
 """The bench on which a model is put together piece by piece."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -102,30 +103,29 @@ class Workshop:
         self, name: str, category: str, placement: Placement, elevation: float, has_front: bool
     ) -> CadModel:
         """Return everything made so far as one model around its centre."""
-        parts = [(*shaded(piece, crease), index) for piece, index, crease in self._pieces]
-        counts = np.cumsum([0] + [len(p[0]) for p in parts])
-        vertices = np.concatenate([p[0] for p in parts])
-        faces = np.concatenate([p[3] + n for p, n in zip(parts, counts[:-1], strict=True)])
-        owner = np.concatenate([np.full(len(p[3]), p[4], np.int16) for p in parts])
+        parts, indices, creases = zip(*self._pieces, strict=True)
+        surface = shaded(parts, creases)
+        vertices = surface.vertices
+        owner = np.repeat(np.array(indices, np.int16), [len(p.faces) for p in parts])
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         centre = 0.5 * (low + high)
         placed = (vertices - centre).astype(np.float32)
         size = placed.max(axis=0) - placed.min(axis=0)
+        x, y, z = (float(c) for c in centre)
         lights = tuple(
-            LightSource(
-                tuple(float(c) for c in np.subtract(s.position, centre)), s.diameter, s.colour
-            )
+            replace(s, position=(s.position[0] - x, s.position[1] - y, s.position[2] - z))
             for s in self.lights
         )
         return CadModel(
             id=name, base=name, category=category, vertices=placed,
-            normals=np.concatenate([p[1] for p in parts]).astype(np.float32),
-            uv=np.concatenate([p[2] for p in parts]).astype(np.float32),
-            faces=faces.astype(np.int32), face_material=owner,
+            normals=surface.normals.astype(np.float32),
+            uv=surface.uv.astype(np.float32),
+            faces=surface.faces.astype(np.int32), face_material=owner,
             materials=tuple(f.material for f in self._finishes),
             size=(float(size[0]), float(size[1]), float(size[2])), placement=placement,
             elevation=elevation if self.elevation is None else self.elevation,
             support_height=None if self.support is None else float(self.support - low[2]),
-            lights=lights, has_front=has_front if self.has_front is None else self.has_front, licence="Apache-2.0",
+            lights=lights,
+            has_front=has_front if self.has_front is None else self.has_front, licence="Apache-2.0",
             creator="The panoscene authors", source="panoscene.synth.models",
         )  # fmt: skip

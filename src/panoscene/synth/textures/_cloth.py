@@ -18,13 +18,13 @@ def _weave(size: int, threads: int) -> tuple[Field, np.ndarray]:
     return np.where(over, weft, warp).astype(np.float32), over
 
 
-def _woven(rng, size, colour, metres, threads, contrast=0.22) -> Draft:
+def _woven(rng, size, colour, metres, threads, *, contrast=0.22) -> Draft:
     """Return a colour picture as a weave with uneven yarn."""
     height, over = _weave(size, threads)
     yarn = np.where(
         over,
-        noise(rng, size, 4, threads, 0.5, (12.0, 1.0)),
-        noise(rng, size, 4, threads, 0.5, (1.0, 12.0)),
+        noise(rng, size, 4, threads, 0.5, stretch=(12.0, 1.0)),
+        noise(rng, size, 4, threads, 0.5, stretch=(1.0, 12.0)),
     )
     fuzz = noise(rng, size, 60, size * 0.48, 0.2)
     tone = 1.0 - contrast + contrast * height + 0.045 * yarn + 0.03 * fuzz
@@ -122,7 +122,9 @@ def wicker(rng: np.random.Generator, size: int) -> Draft:
     tones = [(0.72, 0.54, 0.33), (0.45, 0.29, 0.16), (0.83, 0.73, 0.55), (0.42, 0.4, 0.37)]
     colour = nudge(rng, tones[int(rng.integers(4))], 1.5)
     fibre = np.where(
-        over, noise(rng, size, 8, 200, 0.4, (16.0, 1.0)), noise(rng, size, 8, 200, 0.4, (1.0, 16.0))
+        over,
+        noise(rng, size, 8, 200, 0.4, stretch=(16.0, 1.0)),
+        noise(rng, size, 8, 200, 0.4, stretch=(1.0, 16.0)),
     )
     split = np.where(
         over, np.sin(3 * np.pi * (v * count % 1.0)), np.sin(3 * np.pi * (u * count % 1.0))
@@ -182,7 +184,7 @@ def wallpaper(rng: np.random.Generator, size: int) -> Draft:
         x, y = u * count % 1.0 - 0.5, v * count % 1.0 - 0.5
         mask = 1.0 - step(np.hypot(x, y), 0.13, 0.17)
     else:
-        mask = np.clip(0.5 + 0.3 * noise(rng, size, 8, 300, 0.4, (24.0, 1.0)), 0, 1)
+        mask = np.clip(0.5 + 0.3 * noise(rng, size, 8, 300, 0.4, stretch=(24.0, 1.0)), 0, 1)
     colour = mix(ground, ink, mask * rng.uniform(0.6, 1.0)) * (1.0 + 0.008 * fine)[..., None]
     raised = rng.uniform(0.0, 2e-4)
     return Draft(colour, raised * mask + 2e-5 * fine, 0.82 - 0.25 * mask * rng.random(), 1.06)

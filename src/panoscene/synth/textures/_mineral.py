@@ -104,7 +104,7 @@ def _grid(size: int, across: int, up: int, bond: Number):
     return index, edge
 
 
-def _tiled(rng, size, metres, index, edge, colour, spread, gap, gloss, rise=0.0012) -> Draft:
+def _tiled(rng, size, metres, index, edge, *, colour, spread, gap, gloss, rise=0.0012) -> Draft:
     """Return pieces with joints of grout between them."""
     count = int(index.max()) + 1
     colour = colour * (1.0 + pick(rng.normal(0.0, spread, count), index))[..., None]
@@ -146,7 +146,9 @@ def tile_floor(rng: np.random.Generator, size: int) -> Draft:
         grade = 0.045 if style in ("stone", "bond") else 0.014
         colour = np.asarray(base, np.float32) * (1.0 + grade * cloud)[..., None]
     gloss = float(rng.uniform(0.12, 0.4))
-    return _tiled(rng, size, metres, index, edge * metres, colour, 0.025, 0.003, gloss)
+    return _tiled(
+        rng, size, metres, index, edge * metres, colour=colour, spread=0.025, gap=0.003, gloss=gloss
+    )
 
 
 def tile_wall(rng: np.random.Generator, size: int) -> Draft:
@@ -166,7 +168,18 @@ def tile_wall(rng: np.random.Generator, size: int) -> Draft:
         tone = (0.93, 0.93, 0.91) if white else palette(rng)[int(rng.integers(1, 4))]
         colour = np.asarray(nudge(rng, tone, 0.5), np.float32) * np.ones((size, size, 1))
     wave = noise(rng, size, 4, 24, 1.0)
-    draft = _tiled(rng, size, metres, index, edge * metres, colour, 0.011, 0.0025, 0.12, 0.0015)
+    draft = _tiled(
+        rng,
+        size,
+        metres,
+        index,
+        edge * metres,
+        colour=colour,
+        spread=0.011,
+        gap=0.0025,
+        gloss=0.12,
+        rise=0.0015,
+    )
     tilt = pick(rng.normal(0.0, 2e-4, table), index) + 4e-5 * wave
     return draft._replace(height=draft.height + tilt)
 
@@ -182,7 +195,18 @@ def brick(rng: np.random.Generator, size: int) -> Draft:
     colour = (
         mix(tuple(clay[0]), tuple(clay[1]), share) * (1.0 + 0.07 * rough + 0.06 * cloud)[..., None]
     )
-    draft = _tiled(rng, size, metres, index, edge, colour, 0.09, 0.011, 0.85, 0.005)
+    draft = _tiled(
+        rng,
+        size,
+        metres,
+        index,
+        edge,
+        colour=colour,
+        spread=0.09,
+        gap=0.011,
+        gloss=0.85,
+        rise=0.005,
+    )
     height = draft.height + 5e-4 * rough * step(edge, 0.004, 0.008)
     if rng.random() < 0.4:
         paint = np.asarray(nudge(rng, (0.93, 0.92, 0.9), 0.3), np.float32)
@@ -199,7 +223,7 @@ def plaster(rng: np.random.Generator, size: int) -> Draft:
     if rough:
         height = 7e-4 * noise(rng, size, 20, 160, 0.7)
     else:
-        height = 1.2e-3 * np.abs(noise(rng, size, 2, 30, 1.5, (2.0, 1.0)))
+        height = 1.2e-3 * np.abs(noise(rng, size, 2, 30, 1.5, stretch=(2.0, 1.0)))
         height += 8e-5 * noise(rng, size, 40, size * 0.45, 0.6)
     cloud = noise(rng, size, 1, 24, 1.3)
     tone = 1.0 + 0.009 * cloud + 0.008 * height / height.std()

@@ -17,6 +17,7 @@ def noise(
     low: Number,
     high: Number,
     slope: Number = 1.5,
+    *,
     stretch: tuple[Number, Number] = (1.0, 1.0),
 ) -> Float32[np.ndarray, "size size"]:
     """Return seamless noise of mean 0 and deviation 1 with ``low`` to ``high`` cycles per tile.

@@ -35,18 +35,22 @@ def _ridge(rng: np.random.Generator, size: int, roughness: Number) -> np.ndarray
 
 def landscape(rng: np.random.Generator, size: int) -> Picture:
     """Return hills or mountains under a sky, sometimes over water."""
-    skies = [((0.35, 0.55, 0.78), (0.87, 0.91, 0.93)), ((0.25, 0.25, 0.45), (0.96, 0.62, 0.38)),
-             ((0.62, 0.68, 0.72), (0.9, 0.88, 0.84)), ((0.13, 0.2, 0.36), (0.72, 0.55, 0.6))]  # fmt: skip
+    skies = [
+        ((0.35, 0.55, 0.78), (0.87, 0.91, 0.93)),
+        ((0.25, 0.25, 0.45), (0.96, 0.62, 0.38)),
+        ((0.62, 0.68, 0.72), (0.9, 0.88, 0.84)),
+        ((0.13, 0.2, 0.36), (0.72, 0.55, 0.6)),
+    ]
     top, bottom = skies[int(rng.integers(len(skies)))]
     u, v = axes(size)
     picture = mix(top, bottom, (1.0 - v) * np.ones_like(u) * 1.3)
-    clouds = noise(rng, size, 2, 80, 1.7, (4.0, 1.0))
+    clouds = noise(rng, size, 2, 80, 1.7, stretch=(4.0, 1.0))
     picture = mix(picture, shade(bottom, 1.5), 0.55 * step(clouds, 0.2, 1.8) * step(v, 0.4, 0.8))
     sun = np.hypot(u - rng.uniform(0.2, 0.8), v - rng.uniform(0.6, 0.85))
     picture = mix(picture, (1.0, 0.95, 0.82), 0.9 * np.exp(-((sun / 0.05) ** 2)))
     horizon, layers = rng.uniform(0.4, 0.6), int(rng.integers(3, 6))
     near = nudge(rng, [(0.13, 0.22, 0.14), (0.2, 0.17, 0.12), (0.1, 0.16, 0.2)][layers % 3], 2)
-    grass = noise(rng, size, 10, 300, 0.9, (1.0, 2.0))
+    grass = noise(rng, size, 10, 300, 0.9, stretch=(1.0, 2.0))
     for k in range(layers):
         share = k / (layers - 1)
         crest = (
@@ -57,7 +61,7 @@ def landscape(rng: np.random.Generator, size: int) -> Picture:
         picture = mix(picture, body, step(crest[None, :] - v, 0.0, 0.004))
     if rng.random() < 0.5:
         shore = rng.uniform(0.2, 0.3)
-        wave = noise(rng, size, 8, 200, 0.8, (1.0, 8.0)).T
+        wave = noise(rng, size, 8, 200, 0.8, stretch=(1.0, 8.0)).T
         water = mix(shade(top, 0.8), shade(bottom, 0.95), np.clip(0.5 + 0.35 * wave, 0, 1))
         picture = mix(picture, water, step(shore - v, 0.0, 0.003) * np.ones_like(u))
     return picture
@@ -108,7 +112,7 @@ def _waves(rng: np.random.Generator, size: int) -> Picture:
     field = noise(rng, size, 1, 14, 2.2)
     level = np.floor((field + 3.0) * rng.uniform(1.5, 4.0)).astype(np.int64)
     table = np.array([nudge(rng, colours[int(k)]) for k in rng.integers(0, 5, 32)], np.float32)
-    stroke = noise(rng, size, 10, 300, 0.7, (6.0, 1.0))
+    stroke = noise(rng, size, 10, 300, 0.7, stretch=(6.0, 1.0))
     return table[np.clip(level, 0, 31)] * (1.0 + 0.05 * stroke)[..., None]
 
 
@@ -116,7 +120,7 @@ def _field_painting(rng: np.random.Generator, size: int) -> Picture:
     colours = palette(rng)
     u, v = axes(size)
     picture = np.ones((size, size, 3), np.float32) * np.asarray(colours[3], np.float32)
-    rag, stroke = noise(rng, size, 4, 120, 1.2), noise(rng, size, 8, 300, 0.9, (10.0, 1.0))
+    rag, stroke = noise(rng, size, 4, 120, 1.2), noise(rng, size, 8, 300, 0.9, stretch=(10.0, 1.0))
     edges = np.sort(rng.uniform(0.1, 0.9, 2))
     for low, high, k in ((0.07, edges[0], 0), (edges[0], edges[1], 1), (edges[1], 0.93, 4)):
         inside = np.minimum.reduce(
@@ -206,7 +210,7 @@ def _still_life(rng: np.random.Generator, size: int) -> Picture:
         light = np.hypot(u - x + 0.35 * r, v - y - 0.4 * r) / r
         ball = mix(shade(colour, 1.5), shade(colour, 0.35), step(light, 0.0, 1.7))
         picture = mix(picture, ball, 1.0 - step(d, 0.97, 1.0))
-    stroke = noise(rng, size, 8, 200, 0.7, (3.0, 1.0))
+    stroke = noise(rng, size, 8, 200, 0.7, stretch=(3.0, 1.0))
     return picture * (1.0 + 0.04 * stroke)[..., None]
 
 
@@ -245,6 +249,14 @@ def poster(rng: np.random.Generator, size: int) -> Draft:
         draw.ellipse(
             [(x - r) * unit, (y - r) * unit, (x + r) * unit, (y + r) * unit], fill=ink(tone)
         )
-        draw.ellipse([(x - 1.7 * r) * unit, (y - 0.3 * r) * unit, (x + 1.7 * r) * unit, (y + 0.3 * r) * unit],
-                     outline=ink(shade(tone, 1.5)), width=int(9 * unit) + 1)  # fmt: skip
+        draw.ellipse(
+            [
+                (x - 1.7 * r) * unit,
+                (y - 0.3 * r) * unit,
+                (x + 1.7 * r) * unit,
+                (y + 0.3 * r) * unit,
+            ],
+            outline=ink(shade(tone, 1.5)),
+            width=int(9 * unit) + 1,
+        )
     return _as_print(rng, size, as_field(image.filter(ImageFilter.GaussianBlur(0.6 * unit))))

@@ -46,14 +46,16 @@ def grain(
 ) -> tuple[Field, Field]:
     """Return tone (0 light, 1 dark) and pores (0 or 1) of boards whose fibres run along u."""
     _, v = axes(size)
-    bend = noise(rng, size, 1, 7, 1.4, (3.0, 1.0)) + 0.12 * noise(rng, size, 4, 40, 1.5, (9, 1))
+    bend = noise(rng, size, 1, 7, 1.4, stretch=(3.0, 1.0)) + 0.12 * noise(
+        rng, size, 4, 40, 1.5, stretch=(9, 1)
+    )
     count = max(round(wood.rings * metres), 2)
     phase = (v * count + 1.3 * bend) % 1.0
     late = phase**2.2 * step(1.0 - phase, 0.0, 0.14)
-    fibre = noise(rng, size, 20, size * 0.48, 0.55, (28.0, 1.0))
-    streak = noise(rng, size, 2, 30, 1.0, (9.0, 1.0))
+    fibre = noise(rng, size, 20, size * 0.48, 0.55, stretch=(28.0, 1.0))
+    streak = noise(rng, size, 2, 30, 1.0, stretch=(9.0, 1.0))
     tone = 0.30 + wood.contrast * (1.15 * late - 0.25) + 0.075 * fibre + 0.11 * streak
-    dashes = noise(rng, size, 60, size * 0.48, 0.15, (14.0, 1.0)) + 0.5 * (late - 0.4)
+    dashes = noise(rng, size, 60, size * 0.48, 0.15, stretch=(14.0, 1.0)) + 0.5 * (late - 0.4)
     return np.clip(tone, 0.0, 1.2), step(dashes, 1.55, 2.3) * wood.pores
 
 
@@ -77,7 +79,7 @@ def board(rng: np.random.Generator, size: int) -> Draft:
     )
 
 
-def _laid(rng, size, metres, wood, index, edge, across=None, gap=0.0012) -> Draft:
+def _laid(rng, size, metres, wood, index, *, edge, across=None, gap=0.0012) -> Draft:
     """Return wooden pieces: every piece (its index) has its own cut, every edge a joint."""
     tone, pores = grain(rng, size, metres, wood)
     count = int(index.max()) + 1
@@ -119,7 +121,7 @@ def planks(rng: np.random.Generator, size: int) -> Draft:
     """Return a plank floor, boards along u."""
     metres = 2.4
     index, edge = _plank_grid(rng, size, int(rng.integers(12, 22)), int(rng.integers(2, 4)))
-    return _laid(rng, size, metres, species(rng), index, edge * metres)
+    return _laid(rng, size, metres, species(rng), index, edge=edge * metres)
 
 
 def herringbone(rng: np.random.Generator, size: int) -> Draft:
@@ -142,7 +144,7 @@ def herringbone(rng: np.random.Generator, size: int) -> Draft:
         np.where(across, u * units % 1.0, v * units % 1.0),
     )
     edge = np.minimum(np.minimum(x, ratio - x), np.minimum(y, 1.0 - y)) * metres / units
-    return _laid(rng, size, metres, species(rng), index, edge, across)
+    return _laid(rng, size, metres, species(rng), index, edge=edge, across=across)
 
 
 def panels(rng: np.random.Generator, size: int) -> Draft:
@@ -152,7 +154,16 @@ def panels(rng: np.random.Generator, size: int) -> Draft:
     index = np.floor(u * count).astype(np.int64) * np.ones((size, 1), np.int64)
     place = (u * count) % 1.0 * np.ones_like(v)
     edge = np.minimum(place, 1.0 - place) * metres / count
-    draft = _laid(rng, size, metres, species(rng), index, edge, np.ones((size, size), bool), 0.003)
+    draft = _laid(
+        rng,
+        size,
+        metres,
+        species(rng),
+        index,
+        edge=edge,
+        across=np.ones((size, size), bool),
+        gap=0.003,
+    )
     if rng.random() < 0.5:
         colour = np.asarray(wall_colour(rng), np.float32)
         tone = draft.colour.mean(axis=-1, keepdims=True)
