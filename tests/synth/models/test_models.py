@@ -76,7 +76,8 @@ def _models(kind: str) -> list[CadModel]:
 
 def _open_edges(model: CadModel) -> int:
     """Return how many directed edges have no partner in the other direction."""
-    place = np.unique(model.vertices, axis=0, return_inverse=True)[1].reshape(-1)
+    raw = np.ascontiguousarray(model.vertices + 0.0).view("V12").reshape(-1)
+    place = np.unique(raw, return_inverse=True)[1].reshape(-1)
     faces = place[model.faces].astype(np.int64)
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
@@ -149,13 +150,18 @@ def test_models_differ_pairwise(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", PARAMETRIC_KINDS)
 def test_a_seed_gives_one_model(kind: str) -> None:
-    one, two = make_model(kind, 3, texture_size=16), _made.__wrapped__(kind, 3, 16)
+    one, two = make_model(kind, 3, texture_size=0), _made.__wrapped__(kind, 3, 0)
     np.testing.assert_array_equal(one.vertices, two.vertices)
     np.testing.assert_array_equal(one.uv, two.uv)
     assert [m.name for m in one.materials] == [m.name for m in two.materials]
-    plain = make_model(kind, 3, texture_size=0)
-    np.testing.assert_array_equal(one.vertices, plain.vertices)
-    assert all(m.texture is None for m in plain.materials)
+    assert all(m.texture is None for m in one.materials)
+
+
+@pytest.mark.parametrize("kind", ["counter", "picture", "fridge", "bench"])
+def test_the_size_of_textures_leaves_the_shape(kind: str) -> None:
+    textured, plain = make_model(kind, 3, texture_size=16), make_model(kind, 3, texture_size=0)
+    np.testing.assert_array_equal(textured.vertices, plain.vertices)
+    assert any(m.texture is not None for m in textured.materials)
 
 
 def _material_faces(model: CadModel, start: str) -> np.ndarray:
@@ -189,7 +195,7 @@ def test_the_telling_part_is_at_the_front(kind: str, material: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", ["fridge", "dishwasher", "oven", "counter", "top_cabinet", "chest", "bottom_cabinet"]
+    "kind", ["fridge", "dishwasher", "oven", "counter", "top_cabinet", "chest"]
 )
 def test_handles_are_on_the_front(kind: str) -> None:
     plated = ("metal chrome", "metal nickel", "metal brass", "metal black", "metal copper")
@@ -198,9 +204,7 @@ def test_handles_are_on_the_front(kind: str) -> None:
         for name in plated:
             places = model.vertices[np.unique(_material_faces(model, name))]
             if len(places) and name not in model.materials[0].name:
-                legs = kind in ("bottom_cabinet", "chest")
-                above = places[places[:, 2] > -0.3 * model.size[2]] if legs else places
-                assert (above[:, 1] > 0.3 * model.size[1]).all()
+                assert (places[:, 1] > 0.25 * model.size[1]).all()
                 found += 1
     assert found
 

@@ -93,7 +93,7 @@ def box(low: Point, high: Point, bevel: Number = 0.0015) -> Piece:
         flip = np.where(_CORNERS[:, a] > 0, 1.0, -1.0) * (1.0 if (a + 1) % 3 == first else -1.0)
         vertices.append(points)
         uv.append(np.stack([points[:, first], points[:, second] * flip], axis=1))
-    return outward(Piece(np.concatenate(vertices), np.concatenate(uv), _BOX))
+    return Piece(np.concatenate(vertices), np.concatenate(uv), _BOX)
 
 
 def sheet(low: Point, high: Point) -> Piece:

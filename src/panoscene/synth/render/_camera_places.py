@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.ndimage
 import shapely
+import shapely.geometry.base
 from jaxtyping import Bool, Float64
 
 from panoscene.synth.homes._records import Home
@@ -125,7 +126,7 @@ def _farther(taken: Bool[np.ndarray, "rows columns"], distance: float) -> Bool[n
     return np.asarray(scipy.ndimage.distance_transform_edt(~taken)) * _CELL > distance
 
 
-def _footprint(placed: PlacedModel) -> tuple[float, float, shapely.Geometry]:
+def _footprint(placed: PlacedModel) -> tuple[float, float, shapely.geometry.base.BaseGeometry]:
     """Return the lowest and highest point of a model and its convex outline from above."""
     vertices = placed.model.vertices @ placed.world_from_object[:3, :3].T
     vertices = vertices + placed.world_from_object[:3, 3]
