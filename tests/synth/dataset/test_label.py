@@ -189,6 +189,7 @@ def test_a_home_without_furniture_has_no_objects(taken, photograph):
     panorama = label_panorama(empty, rendered)
     assert len(panorama.scene.objects.category) == 0
     assert panorama.labels.objects == ()
+    assert panorama.scene.relations is not None
     assert panorama.scene.relations.touching.shape == (0, 0)
 
 

@@ -52,13 +52,14 @@ def test_homes_differ() -> None:
 def test_rooms_keep_the_thickness_of_a_wall_between_them(seed: int) -> None:
     home = _home(seed)
     shapes = [shapely.Polygon(room.polygon) for room in home.rooms]
+    walls = [walls_of(room.polygon) for room in home.rooms]
     for a, first in enumerate(shapes):
         assert first.is_valid
         assert first.exterior.is_ccw
         for b in range(a):
             distance = first.distance(shapes[b])
             assert distance >= home.wall_thickness - 1e-9
-            shared = shared_walls(home.rooms[a].polygon, home.rooms[b].polygon, home.wall_thickness)
+            shared = shared_walls(walls[a], walls[b], home.wall_thickness)
             # rooms side by side share a wall exactly
             assert bool(shared) == (distance < home.wall_thickness + 1e-6) or distance > 0.1
     for room in home.rooms:

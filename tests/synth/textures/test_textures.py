@@ -39,7 +39,7 @@ def test_textures_are_square_seeded_and_read_only(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", TEXTURE_KINDS)
 def test_seeds_give_different_textures(kind: str) -> None:
-    colours = [make_texture(kind, seed, size=64).colour.astype(int) for seed in range(6)]
+    colours = [make_texture(kind, seed, size=64).colour.astype(int) for seed in range(4)]
     distance = [np.abs(a - b).mean() for i, a in enumerate(colours) for b in colours[:i]]
     assert min(distance) > 0.0
     assert np.median(distance) > (0.1 if kind == "screen_off" else 2.0)
@@ -48,7 +48,7 @@ def test_seeds_give_different_textures(kind: str) -> None:
 @pytest.mark.parametrize("kind", TILEABLE_KINDS)
 @pytest.mark.parametrize("seed", [0, 3])
 def test_edges_match(kind: str, seed: int) -> None:
-    texture = make_texture(kind, seed, size=256)
+    texture = make_texture(kind, seed, size=128)
     for array in (texture.colour, texture.normal, texture.roughness):
         for axis in (0, 1):
             seam, inside = _step(array, axis)

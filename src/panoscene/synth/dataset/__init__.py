@@ -37,6 +37,7 @@ from ._recipe import HomesOfSplits as HomesOfSplits
 from ._recipe import Recipe as Recipe
 from ._recipe import plan_homes as plan_homes
 from ._recipe import read_recipe as read_recipe
+from ._run_lengths import RunLengths as RunLengths
 from ._run_lengths import decode_mask as decode_mask
 from ._run_lengths import encode_mask as encode_mask
 from ._semantic import SEMANTIC_NAMES as SEMANTIC_NAMES

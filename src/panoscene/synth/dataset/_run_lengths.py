@@ -1,10 +1,20 @@
 """Masks as the compressed run lengths that COCO tools read."""
 
+from typing import TypedDict
+
 import numpy as np
 from jaxtyping import Bool
 
 
-def encode_mask(mask: Bool[np.ndarray, "height width"]) -> dict[str, list[int] | str]:
+class RunLengths(TypedDict):
+    """A mask as COCO's ``segmentation``."""
+
+    size: list[int]
+    """Height and width."""
+    counts: str
+
+
+def encode_mask(mask: Bool[np.ndarray, "height width"]) -> RunLengths:
     """Return a mask in COCO's compressed run-length form: ``size`` and ``counts``.
 
     Convention:

@@ -29,6 +29,7 @@ from ._semantic import SEMANTIC_NAMES
 
 Layer = Literal["rgb", "objects", "distance", "semantic"]
 _CAPTION = 22
+_LEAST_NAMED = 18
 _GAP = 6
 _EDGES = [(a, a | bit) for bit in (1, 2, 4) for a in range(8) if not a & bit]
 
@@ -165,6 +166,8 @@ def _outlined(
     scale = size[0] / rgb.shape[1]
     for label in sorted(kept, key=lambda one: -one.pixels):
         left, top, wide, high = label.box_2d
+        if wide * scale < _LEAST_NAMED:
+            continue  # its name would hide it
         x = min(max((left + wide / 2) % rgb.shape[1] * scale, 24), size[0] - 24)
         draw.text((x, (top + high / 2) * scale), words(label.category), INK, _font(10.0), "mm",
                   stroke_width=2, stroke_fill=PAPER)  # fmt: skip

@@ -55,9 +55,10 @@ def sample_doorways(
     the way of the entrance.
     """
     links: dict[tuple[int, int], _Link] = {}
+    sides = [walls_of(room.polygon) for room in rooms]
     for a in range(len(rooms)):
         for b in range(a + 1, len(rooms)):
-            shared = shared_walls(rooms[a].polygon, rooms[b].polygon, thickness)
+            shared = shared_walls(sides[a], sides[b], thickness)
             longest = max(shared, key=lambda part: part.length, default=None)
             if longest is not None and longest.length >= 0.95:
                 links[a, b] = _Link(a, b, longest)

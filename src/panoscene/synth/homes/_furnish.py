@@ -1,5 +1,6 @@
 """Furniture for homes: room by room, by rules and group templates."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -53,7 +54,8 @@ def furnish_home(
         around = tuple(opening for opening in home.openings if opening.room == index)
         space = Space(home.rooms[index], around, stock, float(np.clip(usual + spread, 0.0, 1.0)))
         _furnish_room(space, home)
-        placed += _records(space, index, offset=len(placed))
+        known = max((piece.group for piece in placed), default=-1)
+        placed += _records(space, index, offset=len(placed), groups=known + 1)
     return replace(home, placed=tuple(placed), openings=tuple(openings))
 
 
@@ -121,6 +123,7 @@ def _furnish_room(space: Space, home: Home) -> None:
     for _ in range(count):
         group = list(more)[int(rng.choice(len(weight), p=weight / weight.sum()))]
         _add(space, group)
+    space.group = -1
     if late_heaters:
         heaters(space)
     ceiling_lamps(space)
@@ -138,10 +141,12 @@ def _add(space: Space, group: Group, tries: int = 1) -> None:
         space.rollback(mark)
 
 
-def _records(space: Space, room: int, offset: int) -> list[Placed]:
-    """Return a room's pieces as records; ``offset`` is the index of the first one."""
+def _records(space: Space, room: int, offset: int, groups: int) -> list[Placed]:
+    """Return a room's pieces as records, from index ``offset`` and group ``groups`` on."""
     numbers = {id(piece): offset + k for k, piece in enumerate(space.pieces)}
-    groups = [piece.group for piece in space.pieces]
+    sizes = Counter(piece.group for piece in space.pieces if piece.group >= 0)
+    shared = [group for group, count in sorted(sizes.items()) if count > 1]
+    group_of = {group: groups + k for k, group in enumerate(shared)}
     carpets = [p for p in space.pieces if p.category == "carpet"]
     records: list[Placed] = []
     lifts: dict[int, float] = {}
@@ -153,8 +158,7 @@ def _records(space: Space, room: int, offset: int) -> list[Placed]:
         elif piece.bottom < 1e-6 and piece.category != "carpet":
             lift = max((c.top for c in carpets if _over(piece, c)), default=0.0)
         lifts[id(piece)] = lift
-        shared = groups.count(piece.group) > 1
-        group = offset + piece.group if shared and piece.group >= 0 else -1
+        group = group_of.get(piece.group, -1)
         records.append(_record(piece, room, support, group, lift))
     return records
 

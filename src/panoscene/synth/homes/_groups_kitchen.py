@@ -96,15 +96,18 @@ def _run(space: Space, units: list[str], height: float) -> list[Piece]:
     run: list[Piece] = []
     turned, begun = False, 0
     rest = list(units)
+    item: Item | None = None
     while rest:
         room = walls.length[leg.wall] - leg.used
         placed = None
-        item = _unit(space, rest[0], height, max(room, 0.3))
+        if item is None or item.model.category != rest[0] or item.size[0] > room:
+            item = _unit(space, rest[0], height, max(room, 0.3))
         if item is not None and item.size[0] <= room + 1e-6:
             placed = _place_unit(space, leg, item)
         if placed is not None:
             run.append(placed)
             rest.pop(0)
+            item = None
             continue
         if begun == len(run) and room > 1.2:
             leg.used += 0.15  # a door or a window down to the floor: begin behind it

@@ -108,11 +108,8 @@ def blocks_around(polygon: Float[np.ndarray, "corners 2"]) -> Float[np.ndarray, 
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
-def shared_walls(
-    first: Float[np.ndarray, "corners 2"], second: Float[np.ndarray, "others 2"], thickness: float
-) -> list[SharedWall]:
+def shared_walls(a: Walls, b: Walls, thickness: float) -> list[SharedWall]:
     """Return where walls of two rooms face each other at the distance of the wall's thickness."""
-    a, b = walls_of(first), walls_of(second)
     opposite = a.normal @ b.normal.T < -0.5
     behind = np.einsum("iak,ik->ia", a.start[:, None] - b.start[None], a.normal)
     low = np.einsum("iak,ik->ia", b.start[None] - a.start[:, None], a.along)

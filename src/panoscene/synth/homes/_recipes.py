@@ -15,7 +15,7 @@ Group = Callable[[Space], Piece | None]
 FIRST: dict[RoomKind, list[tuple[Group, float]]] = {
     "living": [(live.television, 0.94), (live.bookcase, 0.5)],
     "dining": [(live.dining, 1.0), (live.sideboard, 0.7)],
-    "kitchen": [(cook.kitchen, 1.0), (live.dining, 0.6)],
+    "kitchen": [(cook.kitchen, 1.0), (live.dining, 0.75)],
     "bedroom": [(rest.double_bed, 0.93), (rest.wardrobe, 0.85)],
     "child": [(rest.single_bed, 0.9), (rest.desk, 0.7), (rest.wardrobe, 0.4)],
     "bathroom": [(any_room.bathroom, 1.0)],
@@ -42,7 +42,7 @@ MORE: dict[RoomKind, dict[Group, float]] = {
     "living": {
         live.bookcase: 2.0, live.sideboard: 2.0, live.armchair: 1.3, any_room.plant: 2.5,
         any_room.floor_lamp: 1.2, any_room.picture: 3.0, any_room.wall_clock: 0.8,
-        live.piano: 0.6, rest.music: 0.5, live.large_clock: 0.5, live.dining: 0.8,
+        live.piano: 0.6, rest.music: 0.5, live.large_clock: 0.5, live.dining: 1.6,
         rest.desk: 0.5, any_room.basket: 0.5, any_room.bench: 0.3, live.divider: 0.35,
         any_room.loose_carpet: 0.4, any_room.pouf: 0.5, rest.crib: 0.15,
     },
@@ -63,7 +63,7 @@ MORE: dict[RoomKind, dict[Group, float]] = {
         any_room.loose_carpet: 0.7, any_room.floor_lamp: 0.8, live.bookcase: 0.8,
         rest.hanging_screen: 0.4, any_room.bench: 0.5, any_room.basket: 0.7,
         any_room.loose_chair: 0.7, any_room.wall_clock: 0.3, rest.music: 0.2,
-        rest.exercise: 0.25, any_room.trash_can: 0.3,
+        rest.exercise: 0.35, any_room.trash_can: 0.3,
     },
     "child": {
         rest.toys: 2.0, live.bookcase: 1.8, any_room.picture: 2.5, rest.play_table: 1.0,
@@ -99,6 +99,7 @@ MORE: dict[RoomKind, dict[Group, float]] = {
         any_room.wall_clock: 0.7, any_room.floor_lamp: 0.7, rest.music: 0.8,
         any_room.bench: 0.7, live.divider: 0.5, live.sideboard: 0.8, any_room.pouf: 0.7,
         any_room.loose_carpet: 0.6, any_room.trash_can: 0.4, rest.hanging_screen: 0.5,
+        rest.exercise: 1.0, rest.billiards: 0.5,
     },
     "open_plan": {
         live.bookcase: 1.5, live.sideboard: 1.5, any_room.plant: 2.5, any_room.picture: 3.0,

@@ -32,6 +32,12 @@ _CLOTHED = frozenset(
     ("bed", "cushion", "sofa", "sofa_chair", "stool", "chair", "office_chair", "carpet")
 )
 _KEPT_CATEGORIES = frozenset(("plant", "toilet", "bathtub", "sink", "laptop", "monitor"))
+_MACHINES = frozenset(
+    ("washer", "dryer", "dishwasher", "fridge", "microwave", "oven", "stove", "cooktop",
+     "range_hood", "coffee_machine", "heater", "towel_rack", "office_chair", "treadmill")
+)  # fmt: skip
+_ENAMELS: tuple[Colour, ...] = ((0.93, 0.93, 0.93), (0.88, 0.86, 0.8), (0.7, 0.71, 0.72),
+                                (0.3, 0.31, 0.33), (0.08, 0.08, 0.085))  # fmt: skip
 _METALS: tuple[tuple[Colour, float, float], ...] = (
     ((0.82, 0.83, 0.84), 0.14, 1.0), ((0.66, 0.65, 0.63), 0.3, 1.0), ((0.78, 0.6, 0.3), 0.25, 1.0),
     ((0.045, 0.045, 0.05), 0.45, 0.2), ((0.9, 0.9, 0.89), 0.4, 0.0),
@@ -40,11 +46,13 @@ _METALS: tuple[tuple[Colour, float, float], ...] = (
 
 def _named_family(name: str) -> str | None:
     """Return what a material's name says of it; our own names begin with the family."""
-    first = name.split(" ", maxsplit=1)[0]
+    first, tokens = name.split(" ", maxsplit=1)[0], set(re.split(r"[^a-z]+", name))
+    if first == "plastic" and tokens & {"black", "white"}:
+        return "kept"
     for family, words in _WORDS.items():
         if first == family or first in words:
             return family
-    if set(re.split(r"[^a-z]+", name)) & set(_WORDS["kept"]):
+    if tokens & set(_WORDS["kept"]):
         return "kept"
     for family in ("leather", "wood", "fabric", "metal"):
         if any(word in name for word in _WORDS[family]):
@@ -143,6 +151,7 @@ def recoloured(model: CadModel, rng: np.random.Generator, size: int) -> CadModel
     colours = palette(rng)
     shares = _area_shares(model)
     timber, cloth, plating = int(rng.integers(24)), _cloth(rng, "fabric"), int(rng.integers(5))
+    coat = nudge(rng, _ENAMELS[int(rng.choice(5, p=[0.45, 0.15, 0.2, 0.1, 0.1]))], 0.3)
     materials = list(model.materials)
     for k, material in enumerate(model.materials):
         family = _family(material, model.category, float(shares[k]))
@@ -161,8 +170,10 @@ def recoloured(model: CadModel, rng: np.random.Generator, size: int) -> CadModel
             colour, roughness, share = _METALS[plating]
             materials[k] = replace(material, colour=colour, roughness=roughness, metallic=share)
         elif family == "paint" and material.texture is None:
-            choice = colours[int(rng.integers(5))]
-            materials[k] = replace(material, colour=_painted(rng, material.colour, choice))
+            colour = _painted(rng, material.colour, colours[int(rng.integers(5))])
+            if model.category in _MACHINES:
+                colour = coat if min(material.colour) > 0.3 else material.colour
+            materials[k] = replace(material, colour=colour)
         elif family == "paint":
             materials[k] = replace(material, colour=nudge(rng, material.colour, 1.5))
     return replace(model, materials=tuple(materials))
