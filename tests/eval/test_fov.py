@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from panoscene.arrange import ArrangementSettings, arrange
-from panoscene.eval._fov import FOV_DEG, _part_of_scene, fov_sector, run_by_fov, split_by_fov
+from panoscene.eval._fov import FOV_DEG, fov_sector, run_by_fov, split_by_fov
 from panoscene.geometry import wrap_angle
-from panoscene.scene import Detections, Relations, Scene, Shapes, box_mesh
+from panoscene.scene import Detections, Relations, Scene, Shapes, box_mesh, select
 from panoscene.synth import perturb_scene, sample_room
 
 
@@ -150,7 +150,7 @@ def test_the_optimiser_runs_on_each_split_alone(room: Scene) -> None:
 
 def drop(scene: Scene, *names: str) -> Scene:
     kept = torch.tensor([k for k, name in enumerate(scene.objects.id) if name not in names])
-    return _part_of_scene(scene, kept.long())
+    return select(scene, kept.long())
 
 
 def test_dropped_objects_leave_the_others_in_order(room: Scene) -> None:

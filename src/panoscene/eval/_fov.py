@@ -9,7 +9,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from panoscene.geometry import OrientedBoxes
-from panoscene.scene import Detections, Mesh, Objects, Relations, Scene, Shapes
+from panoscene.scene import Detections, Mesh, Objects, Relations, Scene, Shapes, select
 
 FOV_DEG = (360, 180, 120, 90, 60, 30)
 """Horizontal fields of view of the paper's experiment, degrees."""
@@ -66,7 +66,7 @@ def split_by_fov(seen: Seen, fov_deg: int) -> list[Seen]:
         sector = fov_sector(seen.bfov[:, 0], fov_deg)
         return [_part_of_detections(seen, chosen) for chosen in _members(sector, fov_deg)]
     sector = fov_sector(seen.objects.bfov[:, 0], fov_deg)
-    return [_part_of_scene(seen, chosen) for chosen in _members(sector, fov_deg)]
+    return [select(seen, chosen) for chosen in _members(sector, fov_deg)]
 
 
 def run_by_fov(predictor: Callable[[Scene], Scene], scene: Scene, fov_deg: int) -> Scene:
@@ -125,49 +125,6 @@ def _part_of_detections(seen: Detections, chosen: Int64[Tensor, " chosen"]) -> D
     return Detections(seen.bfov[chosen], seen.category[chosen], seen.score[chosen], mask)
 
 
-def _part_of_scene(scene: Scene, chosen: Int64[Tensor, " chosen"]) -> Scene:
-    relations = scene.relations
-    return replace(
-        scene,
-        objects=_part_of_objects(scene.objects, chosen),
-        relations=None if relations is None else _part_of_relations(relations, chosen),
-    )
-
-
-def _part_of_objects(objects: Objects, chosen: Int64[Tensor, " chosen"]) -> Objects:
-    indices = chosen.tolist()
-    shapes = objects.shapes
-    return Objects(
-        boxes=objects.boxes[chosen],
-        category=objects.category[chosen],
-        score=objects.score[chosen],
-        bfov=objects.bfov[chosen],
-        distance_score=objects.distance_score[chosen],
-        yaw_score=objects.yaw_score[chosen],
-        id=tuple(objects.id[index] for index in indices) if objects.id else (),
-        shapes=Shapes(
-            code=None if shapes.code is None else shapes.code[chosen],
-            mesh=tuple(shapes.mesh[index] for index in indices) if shapes.mesh else (),
-        ),
-    )
-
-
-def _part_of_relations(relations: Relations, chosen: Int64[Tensor, " chosen"]) -> Relations:
-    def among(pairs: Tensor) -> Tensor:
-        return pairs[chosen[:, None], chosen[None, :]]
-
-    return Relations(
-        touching=among(relations.touching),
-        touching_wall=relations.touching_wall[chosen],
-        on_floor=relations.on_floor[chosen],
-        under_ceiling=relations.under_ceiling[chosen],
-        inside_room=relations.inside_room[chosen],
-        farther_than=among(relations.farther_than),
-        relative_yaw=among(relations.relative_yaw),
-        relative_yaw_wall=relations.relative_yaw_wall[chosen],
-    )
-
-
 def _named_as(result: Scene, split: Scene) -> Scene:
     """Return the result with ids; those of the split when the predictor returned none."""
     objects, given = result.objects, split.objects
@@ -190,7 +147,7 @@ def _merged(scene: Scene, results: Sequence[Scene]) -> Scene:
     place = {name: index for index, name in enumerate(scene.objects.id)}
     order = sorted(range(len(objects.id)), key=lambda k: place.get(objects.id[k], len(place)))
     joined = replace(scene, objects=objects, relations=_joined_relations(scene, results))
-    return _part_of_scene(joined, torch.tensor(order, dtype=torch.int64))
+    return select(joined, torch.tensor(order, dtype=torch.int64))
 
 
 def _joined_objects(parts: Sequence[Objects]) -> Objects:

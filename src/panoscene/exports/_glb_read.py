@@ -1,7 +1,7 @@
 """GLB files of ours back to scenes, with what was changed in an editor."""
 
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,11 @@ from panoscene.exports._gltf_schema import GltfFile, gltf_file
 from panoscene.geometry import OrientedBoxes, wrap_angle
 from panoscene.scene import (
     Mesh,
-    Objects,
-    Relations,
     Scene,
-    Shapes,
     object_names,
     scene_from_json,
     scene_to_json,
+    select,
 )
 
 UNMOVED = 1e-5
@@ -167,25 +165,11 @@ def _boxes_as_placed(boxes: OrientedBoxes, placed: list[_Placed]) -> OrientedBox
 
 def _selected(scene: Scene, kept: list[int]) -> Scene:
     """Return the scene with some of its objects, some perhaps more than once."""
-    old = scene.objects
-    k = torch.tensor(kept, dtype=torch.int64)
-    objects = Objects(
-        boxes=old.boxes[k],
-        category=old.category[k],
-        score=old.score[k],
-        bfov=old.bfov[k],
-        distance_score=old.distance_score[k],
-        yaw_score=old.yaw_score[k],
-        id=_names(object_names(old), kept),
-        shapes=Shapes(code=None if old.shapes.code is None else old.shapes.code[k]),
-    )
-    relations = scene.relations
-    if relations is not None:
-        columns = {field.name: getattr(relations, field.name)[k] for field in fields(relations)}
-        for name in ("touching", "farther_than", "relative_yaw"):
-            columns[name] = columns[name][:, k]
-        relations = Relations(**columns)
-    return replace(scene, objects=objects, relations=relations)
+    chosen = select(scene, torch.tensor(kept, dtype=torch.int64))
+    # shapes come from the buffers
+    shapes = replace(chosen.objects.shapes, mesh=())
+    names = _names(object_names(scene.objects), kept)
+    return replace(chosen, objects=replace(chosen.objects, id=names, shapes=shapes))
 
 
 def _names(names: tuple[str, ...], kept: list[int]) -> tuple[str, ...]:

@@ -38,6 +38,9 @@ from ._relations import relations_from_boxes as relations_from_boxes
 from ._relations import relative_yaw_angle as relative_yaw_angle
 from ._relations import relative_yaw_bins as relative_yaw_bins
 from ._schema import scene_json_schema as scene_json_schema
+from ._selection import select as select
+from ._selection import select_objects as select_objects
+from ._selection import select_relations as select_relations
 from ._surfaces import Surface as Surface
 from ._surfaces import SurfaceKind as SurfaceKind
 from ._surfaces import box_mesh as box_mesh

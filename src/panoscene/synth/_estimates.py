@@ -23,6 +23,7 @@ from panoscene.scene import (
     Shapes,
     object_names,
     relations_from_boxes,
+    select_objects,
 )
 from panoscene.synth._corrupt import corrupt_relations
 from panoscene.synth._perturb import PerturbNoise, perturb_scene
@@ -84,7 +85,8 @@ def estimate_scene(
     recovered = _estimated_layout(scene, rng, noise.boundary)
     layout = recovered if layout is None else layout
     kept = torch.from_numpy(np.flatnonzero(rng.random(len(scene.objects.boxes)) >= noise.miss))
-    found = _subset(scene.objects, kept)
+    named = replace(scene.objects, id=object_names(scene.objects), shapes=Shapes())
+    found = select_objects(named, kept)
     spurious = _invented(scene, rng, int(rng.poisson(noise.invent * len(scene.objects.boxes))))
     height = scene.panorama.camera_height
     truth = _joined(found, spurious)
@@ -151,19 +153,6 @@ def _confused(
     wrong = torch.from_numpy(rng.random(len(category)) < probability)
     other = torch.from_numpy(rng.integers(len(CATEGORIES), size=len(category)))
     return torch.where(wrong, other, category)
-
-
-def _subset(objects: Objects, kept: Int64[Tensor, " kept"]) -> Objects:
-    names = object_names(objects)
-    return Objects(
-        objects.boxes[kept],
-        objects.category[kept],
-        objects.score[kept],
-        objects.bfov[kept],
-        objects.distance_score[kept],
-        objects.yaw_score[kept],
-        tuple(names[int(k)] for k in kept),
-    )
 
 
 def _joined(first: Objects, second: Objects) -> Objects:

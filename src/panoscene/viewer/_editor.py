@@ -8,9 +8,9 @@ import torch
 
 from panoscene.arrange import ArrangementSettings, Certificate, arrange
 from panoscene.geometry import OrientedBoxes, polygon_contains, wrap_angle
-from panoscene.scene import CATEGORIES, Scene, category_index, object_names
+from panoscene.scene import CATEGORIES, Scene, category_index, object_names, select
 
-from ._objects import taken, with_box, with_relations
+from ._objects import with_box, with_relations
 
 MOST_STATES = 200
 """States that undo remembers."""
@@ -140,7 +140,7 @@ class Editor:
         gone = self.index(name)
         rest = [k for k in range(len(self.names)) if k != gone]
         index = torch.tensor(rest, dtype=torch.int64)
-        return self._then(taken(self.scene, index), f"deleted {name}")
+        return self._then(select(self.scene, index), f"deleted {name}")
 
     def duplicate(self, name: str) -> "Editor":
         """Return the editor after a copy of an object was put to its side, as the last object.
@@ -149,7 +149,7 @@ class Editor:
             ValueError: there is no object of that name.
         """
         source, count = self.index(name), len(self.names)
-        scene = taken(self.scene, torch.tensor([*range(count), source]))
+        scene = select(self.scene, torch.tensor([*range(count), source]))
         copy = self._free_name(CATEGORIES[int(self.scene.objects.category[source])])
         objects = replace(scene.objects, id=(*self.names, copy))
         box = self._beside(self.scene.objects.boxes[source])

@@ -3,11 +3,11 @@
 from dataclasses import fields, replace
 
 import torch
-from jaxtyping import Int64, Shaped
+from jaxtyping import Shaped
 from torch import Tensor
 
 from panoscene.geometry import OrientedBoxes, bfov_from_boxes
-from panoscene.scene import Objects, Relations, Scene, Shapes, relations_from_boxes
+from panoscene.scene import Relations, Scene, relations_from_boxes
 
 
 def with_relations(scene: Scene) -> Scene:
@@ -19,29 +19,6 @@ def with_relations(scene: Scene) -> Scene:
     if scene.relations is not None:
         return scene
     return replace(scene, relations=_derived(scene))
-
-
-def taken(scene: Scene, index: Int64[Tensor, " k"]) -> Scene:
-    """Return the scene with only the objects of the index, in its order; an object may come twice.
-
-    Relations keep their scores; those of an object to its own copy are that of an object to
-    itself, which carries no meaning.
-    """
-    old = scene.objects
-    meshes = tuple(old.shapes.mesh[k] for k in index.tolist()) if old.shapes.mesh else ()
-    code = None if old.shapes.code is None else old.shapes.code[index]
-    objects = Objects(
-        boxes=old.boxes[index],
-        category=old.category[index],
-        score=old.score[index],
-        bfov=old.bfov[index],
-        distance_score=old.distance_score[index],
-        yaw_score=old.yaw_score[index],
-        id=tuple(old.id[k] for k in index.tolist()) if old.id else (),
-        shapes=Shapes(code, meshes),
-    )
-    relations = None if scene.relations is None else _taken_relations(scene.relations, index)
-    return replace(scene, objects=objects, relations=relations)
 
 
 def with_box(scene: Scene, index: int, box: OrientedBoxes) -> Scene:
@@ -91,19 +68,6 @@ def _derived(scene: Scene) -> Relations:
     # as convert and arrange: boxes that are being put right may stick out
     return relations_from_boxes(
         scene.objects.boxes, scene.layout, scene.panorama.camera_height, inside="any_corner"
-    )
-
-
-def _taken_relations(old: Relations, index: Int64[Tensor, " k"]) -> Relations:
-    return Relations(
-        touching=old.touching[index][:, index],
-        touching_wall=old.touching_wall[index],
-        on_floor=old.on_floor[index],
-        under_ceiling=old.under_ceiling[index],
-        inside_room=old.inside_room[index],
-        farther_than=old.farther_than[index][:, index],
-        relative_yaw=old.relative_yaw[index][:, index],
-        relative_yaw_wall=old.relative_yaw_wall[index],
     )
 
 
