@@ -96,7 +96,7 @@ def _drawn(
     """Return the recoloured model and the pose of every piece; equal looks share one model."""
     looks: dict[tuple[str, int, bool], CadModel] = {}
     drawn: list[CadModel] = []
-    poses = np.empty((len(home.placed), 4, 4))
+    poses = np.zeros((len(home.placed), 4, 4))
     for index, piece in enumerate(home.placed):
         leaf = _is_open(home, piece)
         key = (piece.model, piece.look, leaf)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from panoscene.synth.dataset import (
@@ -146,17 +147,18 @@ def follow(
 
 def render_home(task: RenderTask) -> None:
     """Render one home in this process; models and renderer are kept for the next one."""
-    if _KEPT.get("cache") != task.cache:
-        _KEPT["cache"], _KEPT["models"] = task.cache, Models(task.cache)
-    if "renderer" not in _KEPT:
-        _KEPT["renderer"] = Renderer(task.threads)
-    models, renderer = _KEPT["models"], _KEPT["renderer"]
-    assert isinstance(models, Models)
-    assert isinstance(renderer, Renderer)
+    models, renderer = _models(task.cache), _renderer(task.threads)
     photograph_home(task.job, task.index, models, renderer, task.root, extra=task.extra)
 
 
-_KEPT: dict[str, object] = {}
+@lru_cache(maxsize=1)
+def _models(cache: Path) -> Models:
+    return Models(cache)
+
+
+@lru_cache(maxsize=1)
+def _renderer(threads: int) -> Renderer:
+    return Renderer(threads)
 
 
 def _in_order(
