@@ -39,8 +39,8 @@ class Recipe(Format):
     """In each home."""
     width: Annotated[int, Field(ge=64, le=8192, multiple_of=2)] = 1024
     """Columns of a panorama; it has half as many rows."""
-    samples: Annotated[int, Field(ge=1)] = 12
-    """Light paths through each pixel."""
+    samples: Annotated[int, Field(ge=1)] = 8
+    """Light paths through each pixel; half as many near the poles."""
     depth: Annotated[int, Field(ge=1)] = 6
     """Surfaces that a path meets at most."""
     varied_cameras: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5

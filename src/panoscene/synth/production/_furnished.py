@@ -34,7 +34,7 @@ class FurnishedHome:
 
 
 def furnished_home(
-    seed: int, models: Models, part: Part = "seen", *, attempt: int = 0, texture_size: int = 512
+    seed: int, models: Models, part: Part = "seen", *, attempt: int = 0, texture_size: int = 256
 ) -> FurnishedHome:
     """Return the home of a seed, furnished and settled.
 
@@ -55,7 +55,7 @@ def furnished_home(
     home = furnish_home(sample_home(seed), models.summaries(part), rng, density)
     home = replace_models(home, entries, rng, _REPLACED)
     home = _with_leaves(home, entries)
-    home, report = settle_home(home, models, cache=models.cache)
+    home, report = settle_home(home, models.plain(), cache=models.cache)
     drawn, poses = _drawn(home, models, texture_size)
     return FurnishedHome(home, drawn, poses, report)
 

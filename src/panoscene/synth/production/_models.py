@@ -1,5 +1,6 @@
 """All furniture models at once: those of an asset cache, and the parametric ones."""
 
+import copy
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -27,7 +28,7 @@ class Models:
         entries: What the index says of every model, by id; parametric ones are in it too.
     """
 
-    def __init__(self, cache: Path | str, texture_size: int = 512) -> None:
+    def __init__(self, cache: Path | str, texture_size: int = 256) -> None:
         self._library = load_library(cache)
         self._texture_size = texture_size
         self.cache = self._library.cache
@@ -58,6 +59,12 @@ class Models:
     def __len__(self) -> int:
         """Return how many models there are."""
         return len(self.entries)
+
+    def plain(self) -> "Models":
+        """Return the same models without procedural textures: for whoever needs shapes only."""
+        plain = copy.copy(self)
+        plain._texture_size = 0
+        return plain
 
     def unseen_bases(self) -> tuple[str, ...]:
         """Return the base models that are kept from training, sorted."""

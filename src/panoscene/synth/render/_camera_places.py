@@ -34,7 +34,8 @@ def sample_cameras(
     Each stands over free floor: at least 0.45 m from walls, 0.35 m from furniture of any height
     and 0.55 m from what comes near its own height; carpets and lamps overhead do not count.
     Rooms are chosen by their free floor (larger rooms more often, every room at most once before
-    the others had their turn when they are of similar size), and cameras of one room stand apart.
+    the others had their turn when they are of similar size), and cameras of one room stand apart;
+    places with much free floor around them are more likely.
 
     Args:
         home: its rooms and walls.
@@ -50,7 +51,9 @@ def sample_cameras(
     """
     if count < 0:
         raise ValueError(f"count must not be negative, found {count}")
-    origin, free, rooms = free_floor(home, obstacles, 1.9 if robust else 1.6)
+    lowest, highest = (_LOWEST_TILTED, _HIGHEST_TILTED) if robust else (1.6, 1.6)
+    origin, free, rooms = free_floor(home, obstacles, highest, lowest)
+    roomy = np.asarray(scipy.ndimage.distance_transform_edt(free)) * _CELL
     left = np.array([float((free & (rooms == k)).sum()) * _CELL**2 for k in range(len(home.rooms))])
     chance = np.where(left > 0.15, np.sqrt(left), 0.0)
     if chance.sum() == 0:
@@ -62,7 +65,7 @@ def sample_cameras(
         chance[room] *= 0.25
         rows, columns = np.nonzero(free & (rooms == room))
         places = origin + (np.stack([columns, rows], axis=1) + rng.random((len(rows), 2))) * _CELL
-        picks = places[rng.integers(len(places), size=12)]
+        picks = places[rng.choice(len(places), size=12, p=_weights(roomy[rows, columns]))]
         apart = np.full(len(picks), 9.0)
         if used:
             apart = np.linalg.norm(picks[:, None] - np.array(used), axis=2).min(axis=1)
@@ -70,12 +73,11 @@ def sample_cameras(
         far = np.flatnonzero(apart > 1.2)
         place = picks[far[0]] if len(far) else picks[int(apart.argmax())]
         used.append(place)
-        low, high = (_LOWEST_TILTED, _HIGHEST_TILTED) if robust else (1.6, 1.6)
         tilt = rng.uniform(0, _MOST_TILT) if robust else 0.0
         lean = rng.uniform(-np.pi, np.pi)
         cameras.append(
             Camera(
-                (float(place[0]), float(place[1]), float(rng.uniform(low, high))),
+                (float(place[0]), float(place[1]), float(rng.uniform(lowest, highest))),
                 float(rng.uniform(-np.pi, np.pi)),
                 float(tilt * np.cos(lean)),
                 float(tilt * np.sin(lean)),
@@ -87,10 +89,27 @@ def sample_cameras(
     return tuple(cameras)
 
 
+def _weights(clear: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
+    """Return how likely cells are chosen: photographers stand in the open, not in corners."""
+    weight = 0.1 + clear
+    return weight / weight.sum()
+
+
 def free_floor(
-    home: Home, obstacles: Sequence[PlacedModel], camera_height: float
+    home: Home,
+    obstacles: Sequence[PlacedModel],
+    camera_height: float,
+    lowest: float | None = None,
 ) -> tuple[Float64[np.ndarray, "2"], Bool[np.ndarray, "rows columns"], np.ndarray]:
-    """Return the map's lower left corner, where a camera may stand, and the room of each cell."""
+    """Return the map's lower left corner, where a camera may stand, and the room of each cell.
+
+    Args:
+        home: its rooms and walls.
+        obstacles: everything that stands in it.
+        camera_height: of the camera; the greatest one when it varies.
+        lowest: the least height when it varies: what is nearly as high is kept from as well.
+    """
+    lowest = camera_height if lowest is None else lowest
     corners = np.concatenate([room.polygon for room in home.rooms])
     origin = corners.min(axis=0) - 0.5
     columns, rows = np.ceil((corners.max(axis=0) + 0.5 - origin) / _CELL).astype(int)
@@ -115,7 +134,7 @@ def free_floor(
             continue
         inside = shapely.contains_xy(outline.buffer(_CELL / 2), grid_x, grid_y)
         low |= inside
-        high |= inside & (top > camera_height - 0.35)
+        high |= inside & (top > lowest - 0.35)
     free = (room_of >= 0) & _farther(~open_floor, _TO_WALL)
     return origin, free & _farther(low, _TO_OBJECT) & _farther(high, _TO_HIGH), room_of
 

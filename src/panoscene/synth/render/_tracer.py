@@ -16,6 +16,8 @@ from panoscene.synth.render._surface import Surface, leave, meet, reflected, sam
 
 _ROULETTE_FROM = 2
 _BANDS = 4
+"""The first and the last reach from a pole to 45 degrees: the sphere there has few pixels' worth,
+and they get half as many paths."""
 _MOST_PASSES = 8
 """A path goes through at most so many sheets of glass or gauze."""
 
@@ -92,9 +94,15 @@ class Tracer:
     def trace(
         self, camera: Camera, samples: int, depth: int, seed: int
     ) -> Float32[np.ndarray, "height width 9"]:
-        """Return radiance, albedo and normal (camera frame) averaged over each pixel."""
+        """Return radiance, albedo and normal (camera frame) averaged over each pixel.
+
+        Pixels nearer to a pole than 45 degrees, which see little of the sphere, get half of the
+        samples.
+        """
+        shares = [samples if 0 < k < _BANDS - 1 else -(-samples // 2) for k in range(_BANDS)]
         bands = [
-            self._trace_band(camera, samples, depth, seed + 7919 * k, k) for k in range(_BANDS)
+            self._trace_band(camera, share, depth, (seed + 7919 * k) % 2**32, k)
+            for k, share in enumerate(shares)
         ]
         image = np.concatenate(bands)[: camera.width * camera.height]
         image = image.reshape(camera.height, camera.width, 9)
