@@ -1,8 +1,8 @@
 """README and docs/: every ```python block runs, and every panoscene command in ```bash blocks.
 
 The blocks of one page run in order, in one empty folder that holds the sample scene as
-``room.json``; Python blocks share their variables. A block that only shows something is marked
-```text or ```console and does not run.
+``room.json`` and the folder ``samples``; Python blocks share their variables. A block that only
+shows something is marked ```text or ```console and does not run.
 """
 
 import os
@@ -63,6 +63,7 @@ def run_command(line: str) -> None:
 @pytest.mark.parametrize("page", PAGES)
 def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(sample_room_path(), tmp_path / "room.json")
+    (tmp_path / "samples").symlink_to(ROOT / "samples")
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "__docs__"}
     for language, code, line in blocks(ROOT / page):

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import tyro
 
 from panoscene import __version__
+from panoscene.cli import _synth_commands as synth
 from panoscene.cli._commands import (
     arrange,
     bench,
@@ -36,6 +37,12 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "eval export": export,
     "eval score": score,
     "eval report": report,
+    "synth assets": synth.assets,
+    "synth render": synth.render,
+    "synth stats": synth.stats,
+    "synth preview": synth.preview,
+    "synth check": synth.check,
+    "synth export": synth.export,
 }
 """Every command by its name: a function of its options that returns the exit code."""
 
@@ -49,6 +56,16 @@ program that writes scene.json. For example:
     panoscene eval export -o runs/rooms --scenes 200
     panoscene eval score runs/rooms -o results
     panoscene eval report results -o RESULTS.md
+""",
+    "synth": """\
+Make data sets: furnished homes, path-traced panoramas, exact labels.
+
+Needs pip install 'panoscene[synth]' and, on Linux, LLVM (apt-get install libllvm19). For example:
+
+    panoscene synth assets
+    panoscene synth render configs/synth/tiny.yaml tiny
+    panoscene synth check tiny
+    panoscene synth preview tiny -o tiny-preview
 """,
 }
 """What the commands of two words have in common, by their first word."""
@@ -149,8 +166,10 @@ def _is_about_input(error: ValueError) -> bool:
     if isinstance(error, InputError):
         return True
     from panoscene.scene import PanoramaError, SceneFormatError  # noqa: PLC0415
+    from panoscene.synth.assets import AssetError  # noqa: PLC0415
+    from panoscene.synth.dataset import DatasetError  # noqa: PLC0415
 
-    return isinstance(error, SceneFormatError | PanoramaError)
+    return isinstance(error, SceneFormatError | PanoramaError | AssetError | DatasetError)
 
 
 def _discard_output() -> None:

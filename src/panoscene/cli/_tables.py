@@ -57,6 +57,16 @@ def say_before_after(rows: Sequence[tuple[str, int | float, int | float, str]]) 
     _print(table)
 
 
+def say_table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Print rows under titles, the first column as words and the others as numbers."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for number, title in enumerate(titles):
+        table.add_column(title, justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*(Text(str(cell)) for cell in row))
+    _print(table)
+
+
 def _print(table: Table) -> None:
     # a log or a pipe has no width; the default of 80 columns would fold every line
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 140

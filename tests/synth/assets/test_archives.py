@@ -111,3 +111,15 @@ def test_normalised_names_stay_inside(steps: list[str]) -> None:
     assert not name.startswith("/")
     assert ".." not in name.split("/")
     assert normalised_name(name) == name
+
+
+def test_names_that_differ_in_case_only_stay_apart(tmp_path: Path) -> None:
+    (tmp_path / "Chair.obj").write_text("one")
+    (tmp_path / "chair.obj").write_text("two")
+    if len(list(tmp_path.iterdir())) == 1:
+        pytest.skip("the file system does not tell them apart")
+    files = FolderFiles(tmp_path)
+    for name, content in (("Chair.obj", b"one"), ("chair.obj", b"two")):
+        assert files.find(name) == name
+        assert files.read(name) == content
+    assert files.find("CHAIR.OBJ") in {"Chair.obj", "chair.obj"}

@@ -192,3 +192,30 @@ def test_numbers_survive_the_reading() -> None:
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
     polygons = parse_obj(("\n".join(lines) + "\nf 1 2 3").encode(), "x")
     assert np.array_equal(polygons.positions, points)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (b"v 0 0 0\nf 1 1 99999999999999999999999", "no index"),
+        (b"v 0 0 0\nf 1 1 " + b"1" * 1000, "1000 characters"),
+        (b"v 0 0 " + b"0" * 1000 + b"\nf 1 1 1", "1000 characters"),
+    ],
+)
+def test_numbers_too_long_for_memory_are_refused(text: bytes, reason: str) -> None:
+    with pytest.raises(AssetError, match=reason):
+        parse_obj(text, "x.obj")
+
+
+def test_a_material_library_without_a_name_is_passed_over() -> None:
+    polygons = parse_obj(b"mtllib\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "x.obj")
+    assert polygons.material_files == ()
+
+
+@pytest.mark.parametrize("change", [{"width": "0"}, {"lightSourceX": "one"}, {"lightSourceY": ""}])
+def test_lamps_that_make_no_sense_are_an_asset_error(change: dict[str, str]) -> None:
+    entry = {"id": "lamp", "width": "40", "depth": "40", "height": "90", "lightSourceX": "20",
+             "lightSourceY": "20", "lightSourceZ": "80", "lightSourceDiameter": "5"}  # fmt: skip
+    assert len(light_sources(entry, (0.4, 0.4, 0.9))) == 1
+    with pytest.raises(AssetError, match="lamp: its lamps cannot be read"):
+        light_sources(entry | change, (0.4, 0.4, 0.9))

@@ -3,6 +3,10 @@
 import hashlib
 import io
 import os
+import shutil
+import subprocess
+import sys
+import tarfile
 import zipfile
 from collections import Counter
 from dataclasses import replace
@@ -24,7 +28,9 @@ from panoscene.synth.assets import (
     prepare_assets,
     prepare_shapes,
 )
+from panoscene.synth.assets import _debian as debian
 from panoscene.synth.assets._debian import unpack_libraries
+from panoscene.synth.assets._prepare import _in_parallel
 
 CACHE = Path(os.environ.get("PANOSCENE_ASSETS", "/work/assets_cache"))
 
@@ -157,14 +163,74 @@ def test_again_only_what_changed(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_same_files_same_bytes_in_two_processes(folder: Path, tmp_path: Path) -> None:
+def test_same_files_same_bytes_in_another_process(folder: Path, tmp_path: Path) -> None:
+    prepare_assets(tmp_path / "one", [folder], processes=1)
+    program = "import sys\nfrom panoscene.synth.assets import prepare_assets\n"
+    program += "prepare_assets(sys.argv[1], sys.argv[2:], processes=1)"
+    # what depends on the order of a set would now be another
+    environment = os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", program, str(tmp_path / "two"), str(folder)]
+    subprocess.run(command, check=True, env=environment)
     digests = []
-    for name, processes in (("one", 1), ("two", 2)):
-        cache = tmp_path / name
-        prepare_assets(cache, [folder], processes=processes)
-        files = sorted(path for path in cache.rglob("*") if path.is_file())
+    for name in ("one", "two"):
+        files = sorted(path for path in (tmp_path / name).rglob("*") if path.is_file())
         digests.append([(p.name, hashlib.sha256(p.read_bytes()).hexdigest()) for p in files])
     assert digests[0] == digests[1]
+
+
+def test_results_of_several_processes_come_in_order() -> None:
+    told: list[tuple[int, int, str]] = []
+    results = _in_parallel(abs, [-3, 2, -1], 2, lambda *step: told.append(step), str)
+    assert list(results) == [3, 2, 1]
+    assert told == [(1, 3, "-3"), (2, 3, "2"), (3, 3, "-1")]
+
+
+def test_a_library_that_was_replaced_is_read_anew(folder: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    prepare_assets(cache, [folder], processes=1)
+    (folder / "stool.obj").write_text(CHAIR)
+    with (folder / "models.csv").open("a") as table:
+        table.write("\nstool.obj,stool,,,,,,,")
+    report = prepare_assets(cache, [folder], processes=1)
+    assert report.failed == ()
+    assert "mine/stool" in load_library(cache)
+
+
+def test_two_sources_of_one_name_are_refused(folder: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other" / folder.name
+    shutil.copytree(folder, other)
+    with pytest.raises(AssetError, match="found 2 sources of this name"):
+        prepare_assets(tmp_path / "cache", [folder, other], processes=1)
+    assert prepare_assets(tmp_path / "cache", [folder, folder], processes=1).converted == 2
+
+
+@pytest.mark.parametrize("corner", ["0 0 0", "1 0 0"])
+def test_models_without_an_area_are_left_out(folder: Path, tmp_path: Path, corner: str) -> None:
+    """All in one point, or all on a line."""
+    (folder / "chair.obj").write_text(f"v 0 0 0\nv {corner}\nv {corner}\nf 1 2 3\n")
+    for size in ("0.5,0.4,0.9", ",,"):
+        table = f"file,category,width,depth,height\nchair.obj,chair,{size}\nbox.glb,chest,,,\n"
+        (folder / "models.csv").write_text(table)
+        report = prepare_assets(tmp_path / "cache", [folder], processes=1)
+        assert report.failed[0][0] == "mine/chair"
+        assert "no triangle with an area" in report.failed[0][1]
+        assert list(load_library(tmp_path / "cache")) == ["mine/box"]
+
+
+def test_materials_without_a_name_keep_their_colours(folder: Path, tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    for k, colour in enumerate(([255, 0, 0, 255], [0, 0, 255, 255])):
+        part = trimesh.creation.box((0.2, 0.2, 0.2))
+        part.apply_translation((0.5 * k, 0.0, 0.0))
+        part.visual = TextureVisuals(material=PBRMaterial(baseColorFactor=colour))
+        scene.add_geometry(part)
+    content = scene.export(file_type="glb")
+    assert isinstance(content, bytes)
+    (folder / "box.glb").write_bytes(content)
+    prepare_assets(tmp_path / "cache", [folder], processes=1)
+    model = load_library(tmp_path / "cache")["mine/box"]
+    assert {m.colour for m in model.materials} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
+    assert np.bincount(model.face_material).tolist() == [12, 12]
 
 
 def test_one_bad_model_does_not_stop_the_rest(folder: Path, tmp_path: Path) -> None:
@@ -229,9 +295,30 @@ def test_a_library_file_and_a_debian_package(tmp_path: Path) -> None:
             unpack_libraries(package, out)
 
 
-def debian_package(path: Path, files: dict[str, bytes]) -> Path:
-    import tarfile  # noqa: PLC0415 - only here
+def test_packages_that_unpack_to_too_much_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = "./usr/share/sweethome3d"
+    content = {f"{place}/a.sh3f": bytes(4000), f"{place}/b.sh3f": bytes(4000)}
+    package = debian_package(tmp_path / "x.deb", content)
+    for limit in ("_TOTAL_LIMIT", "_MEMBER_LIMIT"):
+        with monkeypatch.context() as patch:
+            patch.setattr(debian, limit, 3000)
+            with pytest.raises(AssetError, match=r"unpacks to more than 3000 bytes|too many"):
+                unpack_libraries(package, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.deb"]
+    # by dpkg-deb, where Python cannot unpack
+    program = tmp_path / "dpkg-deb"
+    program.write_text("#!/bin/sh\nexec head -c 10000 /dev/zero\n")
+    program.chmod(0o755)
+    strange = debian_package(tmp_path / "x.deb", content, suffix="zst")
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(debian, "_MEMBER_LIMIT", 3000)
+    with pytest.raises(AssetError, match="unpacks to more than 3000 bytes"):
+        unpack_libraries(strange, tmp_path)
 
+
+def debian_package(path: Path, files: dict[str, bytes], suffix: str = "xz") -> Path:
     stream = io.BytesIO()
     with tarfile.open(fileobj=stream, mode="w:xz") as data:
         for name, content in files.items():
@@ -239,7 +326,7 @@ def debian_package(path: Path, files: dict[str, bytes]) -> Path:
             member.size = len(content)
             data.addfile(member, io.BytesIO(content))
     body = b"!<arch>\n"
-    for name, content in (("debian-binary", b"2.0\n"), ("data.tar.xz", stream.getvalue())):
+    for name, content in (("debian-binary", b"2.0\n"), (f"data.tar.{suffix}", stream.getvalue())):
         head = f"{name:<16}{0:<12}{0:<6}{0:<6}{100644:<8}{len(content):<10}`\n".encode()
         body += head + content + b"\n" * (len(content) % 2)
     path.write_bytes(body)
@@ -284,6 +371,8 @@ def test_models_made_elsewhere_join(folder: Path, tmp_path: Path) -> None:
 
 
 def test_shapes_of_a_cache(folder: Path, tmp_path: Path) -> None:
+    for package in ("skimage", "fast_simplification"):
+        pytest.importorskip(package)
     cache = tmp_path / "cache"
     prepare_assets(cache, [folder], processes=1)
     assert prepare_shapes(cache, ["mine/box"], processes=1, samples=200, resolution=24) == ()

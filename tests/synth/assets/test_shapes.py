@@ -9,6 +9,9 @@ import trimesh
 from panoscene.synth.assets import AssetError, CadModel, Material, close_surface, sample_shape
 from panoscene.synth.assets._shape_files import is_closed, read_shape, write_shape
 
+for package in ("skimage", "fast_simplification"):
+    pytest.importorskip(package, reason="an optional package")
+
 
 def model(mesh: trimesh.Trimesh, placement: str = "floor") -> CadModel:
     size = np.ptp(mesh.vertices, axis=0)

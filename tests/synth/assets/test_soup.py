@@ -81,6 +81,7 @@ def test_welding_sees_places_not_numbers() -> None:
 
 
 def test_simplified_mesh_keeps_shape_labels_and_texture() -> None:
+    pytest.importorskip("fast_simplification")
     ball = trimesh.creation.icosphere(5, 1.0)
     points = np.asarray(ball.vertices)
     full = soup(ball, uv=points[:, :2] * 0.5 + 0.5)
@@ -101,6 +102,7 @@ def test_simplified_mesh_keeps_shape_labels_and_texture() -> None:
 
 
 def test_open_panels_stay_whole_when_something_else_is_heavy() -> None:
+    pytest.importorskip("fast_simplification")
     panel = trimesh.Trimesh([[0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0]], [[0, 1, 2], [0, 2, 3]])
     ball = trimesh.creation.icosphere(5, 0.5)
     ball.apply_translation((0, 0, 3))
@@ -111,6 +113,7 @@ def test_open_panels_stay_whole_when_something_else_is_heavy() -> None:
 
 
 def test_what_cannot_be_collapsed_is_clustered() -> None:
+    pytest.importorskip("fast_simplification")
     rng = np.random.default_rng(1)
     positions = rng.uniform(0, 1, (3000, 1, 3)) + rng.normal(0, 0.01, (3000, 3, 3))
     loose = Triangles(

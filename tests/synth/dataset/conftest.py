@@ -242,14 +242,14 @@ def library() -> dict[str, CadModel]:
 
 @pytest.fixture(scope="session")
 def small_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a set of four panoramas of four homes, 512 columns wide."""
+    """Return the folder of a set of four panoramas of four homes, 384 columns wide."""
     root = tmp_path_factory.mktemp("set")
     homes = {"train": 1, "val": 1, "test-seen": 1, "test-unseen": 1}
-    recipe = Recipe(homes=HomesOfSplits.model_validate(homes), cameras=1, width=512)
+    recipe = Recipe(homes=HomesOfSplits.model_validate(homes), cameras=1, width=384)
     begin_dataset(root, recipe)
     scene = box_home()
     for k, job in enumerate(next_jobs(root)):
-        camera = replace((CAMERA, TILTED)[k % 2], yaw=0.9 * k, width=512, height=256)
+        camera = replace((CAMERA, TILTED)[k % 2], yaw=0.9 * k, width=384, height=192)
         panorama = label_panorama(
             scene,
             cast(scene, camera, k),

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from panoscene.synth.dataset import (
     open_dataset,
     read_index,
 )
-from panoscene.synth.dataset._checks import Loaded
+from panoscene.synth.dataset._checks import Loaded, _largest_gap
 
 
 @pytest.fixture(scope="module", params=["taken", "tilted"])
@@ -204,6 +205,15 @@ def test_every_check_has_something_that_breaks_it():
     assert {check for check, _ in BREAKS} == set(CHECKS)
 
 
+def test_coarse_pictures_may_end_farther_from_a_face():
+    """Two pixels of 6 mm at 1 m and 1024 columns, of 25 mm at 256."""
+    eye, half = np.array([0.0, -3.0, 0.0]), np.full(3, 0.1)
+    points = np.array([[0.0, -0.04, 0.0], [0.0, 0.04, 0.0]])
+    distance = np.full(2, 1.0)
+    assert _largest_gap(points, eye, half, distance, 1024) == pytest.approx(0.06, abs=1e-9)
+    assert _largest_gap(points, eye, half, distance, 256) is None
+
+
 def test_scenes_without_relations_are_caught(good: Loaded):
     bare: Scene = replace(good.scene, relations=None)
     assert CHECKS["relations"](replace(good, scene=bare))
@@ -253,6 +263,15 @@ def test_missing_and_damaged_files_are_caught(copied: Path):
     (item.folder / "semantic.png").unlink()
     assert broken_by(copied, [item.name]) == {"files"}
     Image.new("L", (20, 10)).save(item.folder / "semantic.png")
+    assert broken_by(copied, [item.name]) == {"files"}
+    huge = bytearray((item.folder / "distance.png").read_bytes())
+    huge[16:24] = (100_000).to_bytes(4, "big") * 2  # width and height: ten thousand million pixels
+    huge[29:33] = zlib.crc32(huge[12:29]).to_bytes(4, "big")
+    (item.folder / "semantic.png").write_bytes(huge)
+    assert broken_by(copied, [item.name]) == {"files"}
+    short = bytearray(huge)
+    short[8:12] = (5).to_bytes(4, "big")  # a header that ends early
+    (item.folder / "semantic.png").write_bytes(short)
     assert broken_by(copied, [item.name]) == {"files"}
     (item.folder / "scene.json").write_text("{")
     assert broken_by(copied, [item.name]) == {"files"}

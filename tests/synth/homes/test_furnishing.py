@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,7 +13,10 @@ from panoscene.geometry import OrientedBoxes, penetration_depth
 from panoscene.scene import CATEGORIES
 from panoscene.synth.homes import (
     Home,
+    Opening,
     PlacedBoxes,
+    Room,
+    RoomKind,
     Summary,
     furnish_home,
     home_scene,
@@ -23,11 +26,11 @@ from panoscene.synth.homes import (
     stand_in_library,
     summary_library,
 )
+from panoscene.synth.homes._library import kind_of
 from panoscene.synth.homes._manhattan import walls_of
-from panoscene.views import draw_birds_eye
 
 LIBRARY = stand_in_library()
-COUNT = 10
+COUNT = 5
 
 
 @functools.cache
@@ -61,17 +64,101 @@ def _all(*categories: str) -> list[tuple[int, int]]:
     ]
 
 
+def _many() -> list[Home]:
+    return [_home(seed) for seed in range(COUNT)]
+
+
+def _empty_room(kind: RoomKind, seed: int) -> Home:
+    """Return one large room with a door and two windows."""
+    room = Room(kind, np.array([[0.0, 0.0], [6.8, 0.0], [6.8, 5.6], [0.0, 5.6]]), 2.65)
+    door = Opening("door", 0, 2, 0.3, 0.9, 0.0, 2.05, hinge_at_start=True)
+    windows = [Opening("window", 0, 0, start, 1.3, 0.85, 2.2) for start in (1.0, 4.2)]
+    return Home(seed, (room,), (door, *windows), ())
+
+
 @functools.cache
-def _many() -> tuple[Home, ...]:
-    return tuple(_home(seed) for seed in range(COUNT))
+def _large_room(kind: RoomKind, seed: int) -> Home:
+    """Return the same room, cluttered."""
+    return furnish_home(_empty_room(kind, seed), LIBRARY, density=0.9)
+
+
+def _rooms() -> list[Home]:
+    return [_large_room(kind, 0) for kind in get_args(RoomKind)]
 
 
 def test_every_category_occurs() -> None:
-    large = [furnish_home(sample_home(s, rooms=8), LIBRARY, density=0.8) for s in range(5, 10)]
-    statistics = home_statistics([*_many(), *large], LIBRARY)
+    homes = [*_many(), *_rooms(), _large_room("child", 1)]
+    statistics = home_statistics(homes, LIBRARY)
     assert [name for name in CATEGORIES if statistics.categories[name] == 0] == []
     assert 11.0 < home_statistics(_many(), LIBRARY).objects_mean < 20.0
     assert statistics.objects_per_room["living"] > statistics.objects_per_room["hall"]
+
+
+def _kinds(home: Home) -> list[str]:
+    models = {model.id: model for name in (*CATEGORIES, "") for model in LIBRARY.models(name)}
+    return [kind_of(models[piece.model]) for piece in home.placed]
+
+
+def test_decoration_is_where_it_belongs() -> None:
+    seen: set[str] = set()
+    for home in (*_many(), *_rooms()):
+        names, boxes = _kinds(home), placed_boxes(home, LIBRARY)
+        for k, (piece, name) in enumerate(zip(home.placed, names, strict=True)):
+            if boxes.category[k]:
+                continue
+            seen.add(name)
+            room, low = home.rooms[piece.room], _bottom(boxes, k)
+            high = low + boxes.size[k, 2]
+            if name == "ceiling_lamp":
+                assert high == pytest.approx(room.ceiling_height)
+                assert low > 1.25
+            elif name in ("curtain", "socket", "switch"):
+                assert piece.support is None
+                edge = shapely.Polygon(room.polygon).exterior
+                assert _footprint(boxes, k).distance(edge) < 0.02
+            elif name == "toys":
+                assert low < 0.031
+                assert room.kind == "child"
+            else:
+                assert piece.support is not None
+            if name == "towels":
+                assert room.kind in ("bathroom", "laundry")
+    assert seen == {
+        *("books", "bottles", "candles", "ceiling_lamp", "curtain", "dishes", "small_box"),
+        *("socket", "switch", "towels", "toys", "vase"),
+    }
+
+
+def test_switches_are_beside_doors_on_the_side_of_the_handle() -> None:
+    home = _large_room("office", 0)
+    boxes, names = placed_boxes(home, LIBRARY), _kinds(home)
+    (k,) = [k for k, name in enumerate(names) if name == "switch"]
+    # the door is in the wall at y = 5.6, from x = 6.5 with its hinges to x = 5.6
+    assert 5.3 < boxes.centre[k, 0] < 5.55
+    assert boxes.centre[k, 1] == pytest.approx(5.6 - boxes.size[k, 1] / 2)
+    assert boxes.centre[k, 2] == pytest.approx(1.09)
+
+
+def test_curtains_hang_before_windows() -> None:
+    widths = []
+    for seed in range(5):
+        home = _large_room("bedroom", seed)
+        boxes, names = placed_boxes(home, LIBRARY), _kinds(home)
+        for k in [k for k, name in enumerate(names) if name == "curtain"]:
+            gap = np.abs(boxes.centre[k, 0] - np.array([1.65, 4.85])).min()
+            assert gap < 1e-6
+            assert boxes.centre[k, 1] < 0.1
+            assert _bottom(boxes, k) + boxes.size[k, 2] > 2.2
+            widths.append(boxes.size[k, 0])
+    assert len(widths) > 2
+    assert min(widths) > 1.45
+
+
+def test_a_library_without_decoration_is_enough() -> None:
+    plain = summary_library(m for name in CATEGORIES for m in LIBRARY.models(name))
+    home = furnish_home(sample_home(1, rooms=3), plain)
+    assert len(home.placed) > 20
+    assert all(placed_boxes(home, plain).category)
 
 
 @pytest.mark.parametrize("seed", range(0, COUNT, 2))
@@ -90,7 +177,7 @@ def test_boxes_do_not_overlap(seed: int) -> None:
         assert supported, (home.placed[a].model, home.placed[b].model, deep)
 
 
-@pytest.mark.parametrize("seed", range(0, COUNT, 4))
+@pytest.mark.parametrize("seed", range(1, COUNT, 3))
 def test_pieces_are_inside_their_rooms(seed: int) -> None:
     home, boxes = _home(seed), _boxes(seed)
     for k, piece in enumerate(home.placed):
@@ -124,6 +211,7 @@ def test_windows_are_not_hidden() -> None:
     hidden = 0
     for seed in range(COUNT):
         home, boxes = _home(seed), _boxes(seed)
+        names = _kinds(home)
         for opening in home.openings:
             if opening.kind != "window":
                 continue
@@ -137,7 +225,8 @@ def test_windows_are_not_hidden() -> None:
                 if piece.room == opening.room and piece.opening is None and high and low:
                     overlap = zone.intersection(_footprint(boxes, k)).area
                     # things on furniture may reach above the sill
-                    hidden += overlap > 1e-6 and piece.support is None
+                    free = piece.support is not None or names[k] == "curtain"
+                    hidden += overlap > 1e-6 and not free
     assert hidden == 0
 
 
@@ -169,7 +258,7 @@ def test_beds_stand_with_their_head_at_a_wall_between_chests() -> None:
             for j in range(len(home.placed))
             if home.placed[k].group >= 0
         )
-    assert len(beds) > 10
+    assert len(beds) > 6
     assert beside > 0.6 * len(beds)
 
 
@@ -213,7 +302,7 @@ def test_chairs_face_their_table() -> None:
             ray = shapely.LineString([boxes.centre[k, :2], boxes.centre[k, :2] + 1.0 * front])
             assert ray.intersects(_footprint(boxes, j))
             seen += 1
-    assert seen > 12
+    assert seen > 6
 
 
 def test_hoods_hang_above_stoves() -> None:
@@ -223,11 +312,12 @@ def test_hoods_hang_above_stoves() -> None:
         below = [
             j
             for j, name in enumerate(boxes.category)
-            if name in ("stove", "oven") and _footprint(boxes, j).intersects(_footprint(boxes, k))
+            if name in ("stove", "oven", "cooktop")
+            and _footprint(boxes, j).intersects(_footprint(boxes, k))
         ]
         assert below
         assert _bottom(boxes, k) > 1.5
-    assert len(hoods) > 5
+    assert len(hoods) > 2
 
 
 def test_doors_and_windows_fill_their_openings() -> None:
@@ -253,25 +343,24 @@ def test_doors_and_windows_fill_their_openings() -> None:
 
 
 def test_cluttered_homes_hold_more_than_sparse_ones() -> None:
-    home = sample_home(5)
-    counts = [len(furnish_home(home, LIBRARY, density=d).placed) for d in (0.0, 0.5, 1.0)]
-    assert counts[0] < counts[1] < counts[2]
-    assert counts[2] > 1.5 * counts[0]
+    home = sample_home(5, rooms=3)
+    counts = [len(furnish_home(home, LIBRARY, density=d).placed) for d in (0.0, 1.0)]
+    assert counts[1] > 1.4 * counts[0]
 
 
 def test_one_seed_gives_one_furnishing() -> None:
-    home = sample_home(8)
-    assert furnish_home(home, LIBRARY).placed == furnish_home(home, LIBRARY).placed
-    other = furnish_home(home, LIBRARY, np.random.default_rng(1))
-    assert other.placed != furnish_home(home, LIBRARY).placed
+    home, first = _empty_room("office", 0), _large_room("office", 0)
+    assert furnish_home(home, LIBRARY, density=0.9).placed == first.placed
+    other = furnish_home(home, LIBRARY, np.random.default_rng(1), density=0.9)
+    assert other.placed != first.placed
 
 
 def test_a_small_library_leaves_things_out() -> None:
     bed = Summary("bed/1", "bed", (1.6, 2.05, 0.6), support_height=0.5)
     door = Summary("door/1", "door", (0.9, 0.12, 2.05), "in_wall")
-    home = furnish_home(sample_home(1, rooms=5), summary_library([bed, door]))
+    home = furnish_home(sample_home(1, rooms=4), summary_library([bed, door]))
     assert {piece.model for piece in home.placed} == {"bed/1", "door/1"}
-    empty = furnish_home(sample_home(1, rooms=5), summary_library([]))
+    empty = furnish_home(sample_home(1, rooms=4), summary_library([]))
     assert empty.placed == ()
 
 
@@ -287,20 +376,17 @@ def test_wrong_arguments_are_refused() -> None:
         home_scene(_home(0), LIBRARY, 99, (0.0, 0.0))
 
 
-def test_a_room_is_a_scene(tmp_path: Path) -> None:
-    home, boxes = _home(5), _boxes(5)
+def test_a_room_is_a_scene() -> None:
+    home, boxes = _home(4), _boxes(4)
     middle = home.rooms[1].polygon.mean(axis=0)
     scene = home_scene(home, LIBRARY, 1, (float(middle[0]), float(middle[1])), yaw=0.4)
-    inside = [
-        k for k, piece in enumerate(home.placed) if piece.room == 1 and boxes.category[k] != ""
-    ]
+    inside = [k for k, piece in enumerate(home.placed) if piece.room == 1 and boxes.category[k]]
     assert len(scene.objects.category) >= len(inside)
     assert scene.objects.id[3].endswith("_3")
     distance = scene.objects.boxes.centre[:, :2].norm(dim=1).numpy()
     offset = np.linalg.norm(boxes.centre[inside, :2] - middle, axis=1)
     assert np.abs(distance[:, None] - offset).min(axis=0).max() < 1e-4
-    draw_birds_eye(scene, tmp_path / "room.png")
-    assert (tmp_path / "room.png").stat().st_size > 10_000
+    assert scene.layout.ceiling_height == home.rooms[1].ceiling_height
 
 
 def test_summaries_of_any_source_are_a_library() -> None:

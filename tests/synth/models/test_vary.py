@@ -30,7 +30,7 @@ def _library_model(category: str, materials: tuple[Material, ...]) -> CadModel:
 
 @pytest.mark.parametrize("kind", PARAMETRIC_KINDS)
 def test_copies_keep_base_category_and_shape(kind: str) -> None:
-    model = make_model(kind, 1, texture_size=0)
+    model = make_model(kind, 0, texture_size=0)
     copy = vary_model(model, np.random.default_rng(4), texture_size=0)
     assert copy.base == model.base
     assert copy.id != model.id

@@ -6,6 +6,7 @@ import pytest
 
 from panoscene.synth.homes import Opening
 from panoscene.synth.physics import check_home, settle_home
+from panoscene.synth.physics._engine import Body, simulate
 
 mujoco = pytest.importorskip("mujoco", reason="the engine is an optional package")
 
@@ -153,3 +154,12 @@ def test_errors(put, home_of, models, monkeypatch, cache):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ModuleNotFoundError, match=r"panoscene\[synth\]"):
         settle_home(home, models, cache=cache)
+
+
+def test_the_engine_leaves_no_log_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    corners = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
+    boxes = np.array([[[-0.1, -0.1, -0.1], [0.1, 0.1, 0.1]]])
+    lost = Body(boxes, np.array([0.0, 0.0, 1e11]), 0.0, "free")
+    simulate([lost], corners, 3)
+    assert list(tmp_path.iterdir()) == []

@@ -1,5 +1,7 @@
 """Where panoramas are taken."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import shapely
@@ -8,6 +10,7 @@ from panoscene.synth.homes import Home
 from panoscene.synth.render import (
     Camera,
     RenderScene,
+    free_floor,
     home_from_camera,
     pixel_rays,
     sample_cameras,
@@ -63,3 +66,17 @@ def test_pitch_looks_up_and_roll_leans_to_the_right():
     np.testing.assert_allclose(up, (0.0, np.cos(0.1), np.sin(0.1)))
     top = home_from_camera(Camera((0.0, 0.0, 1.6), roll=0.1)) @ (0.0, 0.0, 1.0)
     np.testing.assert_allclose(top, (np.sin(0.1), 0.0, np.cos(0.1)))
+
+
+def test_low_cameras_keep_away_from_what_is_as_high_as_they_are(home: Home, scene: RenderScene):
+    """A chest of 1.3 m is far below a camera at 1.9 m, but beside one at 1.2 m."""
+    tall = dataclasses.replace(scene.placed[4], world_from_object=np.eye(4))
+    tall.world_from_object[:3, 3] = 7.0, 2.0, 0.65
+    tall.world_from_object[2, 2] = 1.3 / tall.model.size[2]
+    outline = shapely.box(6.2, 1.0, 7.8, 3.0)
+    for height, lowest, clear in ((1.9, None, 0.35), (1.9, 1.2, 0.55)):
+        origin, free, _ = free_floor(home, [tall], height, lowest)
+        rows, columns = np.nonzero(free)
+        places = shapely.points(origin + (np.stack([columns, rows], axis=1) + 0.5) * 0.05)
+        apart = shapely.distance(outline, places)
+        assert clear - 0.05 < apart.min() < clear + 0.1

@@ -160,6 +160,7 @@ class FolderFiles:
             raise AssetError(folder, "expected a folder with models")
         found = sorted(path for path in self._folder.rglob("*") if path.is_file())
         self._names = [path.relative_to(self._folder).as_posix() for path in found]
+        self._known = frozenset(self._names)
         self._folded = {name.lower(): name for name in self._names}
 
     def names(self) -> Iterable[str]:
@@ -168,7 +169,7 @@ class FolderFiles:
 
     def find(self, name: str) -> str | None:
         """Return the true name of a file, whatever the case of its letters, or None."""
-        return self._folded.get(name.lower())
+        return name if name in self._known else self._folded.get(name.lower())
 
     def path(self, name: str) -> Path:
         """Return where a file is, once it is known to be inside the folder."""

@@ -7,6 +7,7 @@ import re
 import zipfile
 import zlib
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, Literal
 
 import numpy as np
@@ -175,7 +176,8 @@ def _read(path: Path, arrays: bool) -> tuple[dict[str, Any], dict[str, np.ndarra
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
             head = json.loads(str(content["head"]))
             found = {name: content[name] for name in _ARRAYS} if arrays else {}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error,
+            TokenError, SyntaxError) as error:  # fmt: skip
         raise AssetError(path, f"damaged model file: {error}") from error
     if (head.get("format"), head.get("version")) != (CACHE_FORMAT, CACHE_VERSION):
         raise AssetError(path, f"expected a model file of version {CACHE_VERSION}")

@@ -76,9 +76,22 @@ def light_sources(
     Args:
         entry: Fields of the catalogue.
         size: Width, depth and height to which the catalogue's box is scaled.
+
+    Raises:
+        AssetError: A field is missing or has too few numbers, or words that are none.
     """
     if "lightSourceX" not in entry:
         return ()
+    try:
+        return _light_sources(entry, size)
+    except (ValueError, KeyError, ZeroDivisionError) as error:
+        reason = f"its lamps cannot be read: {error}"
+        raise AssetError(entry.get("id", "catalogue"), reason) from error
+
+
+def _light_sources(
+    entry: dict[str, str], size: tuple[float, float, float]
+) -> tuple[LightSource, ...]:
     fields = ("lightSourceX", "lightSourceY", "lightSourceZ", "lightSourceDiameter")
     columns = [[float(x) for x in entry.get(field, "").split()] for field in fields]
     box = [float(entry[field]) for field in ("width", "depth", "height")]

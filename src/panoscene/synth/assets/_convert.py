@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 from jaxtyping import Float64
-from scipy.spatial import KDTree
+from scipy.spatial import KDTree, QhullError
 
 from ._archives import ModelFiles
 from ._catalogue import light_sources
@@ -24,6 +24,8 @@ _OBJECT_FROM_FILE = {
     "z": np.array([[-1.0, 0, 0], [0, -1, 0], [0, 0, 1]]),
 }
 """Files look at the viewer with their right on his right; +x is the model's own right."""
+_BAD_GEOMETRY = (ValueError, ArithmeticError, LookupError, QhullError)
+"""What numpy, scipy and trimesh say of geometry that is none."""
 _NEAR_LAMP = 0.2
 _NO_FRONT = frozenset({"plant", "carpet", "cushion", "basket"})
 _MAY_BE_ROUND = frozenset(
@@ -51,16 +53,22 @@ def convert_models(
     try:
         loaded = load_model(files, base.file, defaults)
         loaded = replace(loaded, triangles=_canonical(loaded.triangles, base))
-    except AssetError as error:
-        return [AssetError(spec.id, str(error)) for spec in specs]
+    except _BAD_GEOMETRY as error:
+        return [_refused(spec, error) for spec in specs]
     models: list[CadModel | AssetError] = []
     for spec in specs:
         try:
             entry = catalogue.get(spec.catalogue_id, {})
             models.append(_finished(spec, loaded, dict(entry), max_faces))
-        except AssetError as error:
-            models.append(error)
+        except _BAD_GEOMETRY as error:
+            models.append(_refused(spec, error))
     return models
+
+
+def _refused(spec: ModelSpec, error: Exception) -> AssetError:
+    """Return why a model is left out; one that nobody foresaw does not stop the others."""
+    known = isinstance(error, AssetError)
+    return AssetError(spec.id, str(error) if known else f"cannot be converted: {error}")
 
 
 def _canonical(triangles: Triangles, spec: ModelSpec) -> Triangles:
@@ -91,6 +99,8 @@ def _transformed(triangles: Triangles, matrix: Float64[np.ndarray, "3 3"]) -> Tr
 def _fitted(triangles: Triangles, size: tuple[float, float, float] | None) -> Triangles:
     """Return triangles centred on their bounding box and stretched to ``size``."""
     corners = triangles.positions.reshape(-1, 3)
+    if not len(corners) or not np.ptp(corners, axis=0).any():
+        raise AssetError("model", "no triangle with an area is left")
     low, high = corners.min(axis=0), corners.max(axis=0)
     extent = high - low
     scale = np.ones(3)
@@ -188,13 +198,15 @@ def _with_lights(
 def _merged(
     materials: tuple[Material, ...], triangles: Triangles
 ) -> tuple[tuple[Material, ...], np.ndarray]:
-    """Return the materials in use, one for each name and kind, and the one of each face."""
-    number: dict[tuple[str, str], int] = {}
+    """Return the materials in use, one for each name and look, and the one of each face."""
+    number: dict[tuple[object, ...], int] = {}
     used: list[Material] = []
     lookup = np.zeros(len(materials), np.int16)
     for label in np.unique(triangles.label):
         material = materials[label]
-        key = (material.name, material.kind)
+        # GLB files may have many materials without a name
+        plain = (material.colour, material.roughness, material.metallic, material.opacity)
+        key = (material.name, material.kind, id(material.texture), *plain)
         if key not in number:
             number[key] = len(used)
             used.append(material)

@@ -14,6 +14,8 @@ from ._errors import AssetError
 
 DEBIAN_PACKAGES = ("sweethome3d", "sweethome3d-furniture")
 _MEMBER_LIMIT = 512 * 2**20
+_TOTAL_LIMIT = 2 * 2**30
+"""Bytes of all members of a package, unpacked; the true ones have 150 MB."""
 
 
 def fetch_libraries(folder: Path) -> tuple[Path, ...]:
@@ -69,9 +71,13 @@ def unpack_libraries(package: Path, folder: Path) -> tuple[Path, ...]:
         AssetError: The file is no Debian package, or holds no library.
     """
     written: list[Path] = []
+    total = 0
     try:
         with _data_stream(package) as stream, tarfile.open(fileobj=stream, mode="r|") as data:
             for member in data:
+                total += member.size
+                if total > _TOTAL_LIMIT:
+                    raise AssetError(package, f"unpacks to more than {_TOTAL_LIMIT} bytes")
                 path = PurePosixPath(member.name)
                 wanted = path.suffix == ".sh3f" or path.name == "sweethome3d.jar"
                 if not (wanted and member.isfile() and "sweethome3d" in path.parts[:-1]):
@@ -115,10 +121,16 @@ def _unpacked_by_dpkg(package: Path) -> bytes:
     if command is None:
         raise AssetError(package, "its compression needs dpkg-deb, which is not here")
     call = [command, "--fsys-tarfile", str(package)]
-    done = subprocess.run(call, capture_output=True, check=False)  # noqa: S603 - fixed command
-    if done.returncode != 0:
+    with subprocess.Popen(  # noqa: S603 - fixed command
+        call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as running:
+        content = running.stdout.read(_MEMBER_LIMIT + 1) if running.stdout else b""
+        if len(content) > _MEMBER_LIMIT:
+            running.kill()
+            raise AssetError(package, f"unpacks to more than {_MEMBER_LIMIT} bytes")
+    if running.returncode != 0:
         raise AssetError(package, "dpkg-deb cannot unpack it")
-    return done.stdout
+    return content
 
 
 def _ar_members(package: Path) -> Iterator[tuple[str, bytes]]:

@@ -41,7 +41,7 @@ def _collapsed(triangles: Triangles, max_faces: int, way: dict[str, Any]) -> Tri
     try:
         import fast_simplification  # noqa: PLC0415 - optional
     except ImportError as error:
-        hint = "large models need fast-simplification: pip install panoscene[synth]"
+        hint = "large models need fast-simplification: pip install 'panoscene[synth]'"
         raise AssetError("fast-simplification", hint) from error
     corners = weld(triangles.positions)
     points = np.zeros((int(corners.max()) + 1, 3))

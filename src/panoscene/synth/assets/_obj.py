@@ -8,6 +8,8 @@ from jaxtyping import Float64, Int64
 from ._errors import AssetError
 
 _MAX_CORNERS = 8_000_000
+_LONGEST_WORD = 64
+"""Characters of a number; a table of words takes as much memory as its longest one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +72,13 @@ def parse_obj(content: bytes, name: str) -> Polygons:
             row = words[1 : 1 + width[key]]
             row += [b"0"] * (width[key] - len(row))
             numbers[key] += row
+            if len(numbers[key]) > 3 * _MAX_CORNERS:
+                raise AssetError(name, f"found more than {_MAX_CORNERS} vertices")
         elif key == b"f" and len(words) > 3:
             tokens += words[1:]
             counts.append(len(words) - 1)
+            if len(tokens) > _MAX_CORNERS:
+                break
             labels.append((part, material))
             have = (len(numbers[b"v"]) // 3, len(numbers[b"vt"]) // 2, len(numbers[b"vn"]) // 3)
             seen.append(have)
@@ -80,7 +86,7 @@ def parse_obj(content: bytes, name: str) -> Polygons:
             part = parts.number(words[1:])
         elif key == b"usemtl":
             material = materials.number(words[1:])
-        elif key == b"mtllib":
+        elif key == b"mtllib" and len(words) > 1:
             libraries.append(line.split(None, 1)[1].strip().decode("utf-8", "replace"))
     if not 0 < len(tokens) <= _MAX_CORNERS:
         raise AssetError(name, f"found {len(counts)} faces with {len(tokens)} corners")
@@ -104,6 +110,7 @@ def parse_obj(content: bytes, name: str) -> Polygons:
 
 
 def _table(words: list[bytes], width: int, name: str) -> Float64[np.ndarray, "rows width"]:
+    _refuse_long(words, name)
     try:
         table = np.array(words, "S").astype(np.float64) if words else np.zeros(0)
     except ValueError as error:
@@ -113,6 +120,12 @@ def _table(words: list[bytes], width: int, name: str) -> Float64[np.ndarray, "ro
     return table.reshape(-1, width)
 
 
+def _refuse_long(words: list[bytes], name: str) -> None:
+    longest = max(map(len, words), default=0)
+    if longest > _LONGEST_WORD:
+        raise AssetError(name, f"found a number of {longest} characters")
+
+
 def _corners(
     tokens: list[bytes],
     have: Int64[np.ndarray, "corners 3"],
@@ -120,6 +133,7 @@ def _corners(
     name: str,
 ) -> Int64[np.ndarray, "corners 3"]:
     """Return 0-based indices from ``position/uv/normal`` texts; uv and normal may be missing."""
+    _refuse_long(tokens, name)
     slashes = np.char.count(np.array(tokens, "S"), b"/") if tokens else np.zeros(0, np.int64)
     raw = np.zeros((len(tokens), 3), np.int64)
     try:
@@ -129,7 +143,7 @@ def _corners(
             text = (text + b" ").replace(b"//", b"/0/").replace(b"/ ", b"/0 ").replace(b"/", b" ")
             found = np.array(text.split(), "S").astype(np.int64).reshape(len(rows), number + 1)
             raw[rows, : number + 1] = found[:, :3]
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise AssetError(name, f"found a face corner that is no index: {error}") from error
     index = np.where(raw > 0, raw - 1, np.where(raw < 0, raw + have, -1))
     bad = (index >= np.array(lengths)) | ((raw < 0) & (index < 0))

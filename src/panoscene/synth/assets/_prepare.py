@@ -65,6 +65,8 @@ class _ConvertTask:
     specs: tuple[ModelSpec, ...]
     keys: tuple[str, ...]
     max_faces: int
+    digest: str
+    """Of the library: another content is opened anew."""
 
 
 def prepare_assets(
@@ -158,7 +160,13 @@ def _libraries(cache: Path, sources: list[Path]) -> tuple[Path, ...]:
             found += unpack_libraries(source, cache / "libraries")
         else:
             found.append(source)
-    return tuple(dict.fromkeys(path.resolve() for path in found))
+    libraries = tuple(dict.fromkeys(path.resolve() for path in found))
+    names = Counter(path.name for path in libraries)
+    for path in libraries:
+        if names[path.name] > 1:
+            reason = f"found {names[path.name]} sources of this name, which their models' ids have"
+            raise AssetError(path, reason)
+    return libraries
 
 
 def _digest(path: Path) -> str:
@@ -177,7 +185,7 @@ def _tasks(cache: Path, library: Path, digest: str, max_faces: int) -> list[_Con
         table = files.read("models.csv").decode("utf-8-sig", "replace")
         groups = [(spec,) for spec in folder_models(table, files.name)]
     else:
-        _opened(library)
+        _opened(library, digest)
         by_file: dict[str, list[ModelSpec]] = {}
         for spec in known_models():
             if spec.library == library.name:
@@ -191,6 +199,7 @@ def _tasks(cache: Path, library: Path, digest: str, max_faces: int) -> list[_Con
             specs,
             tuple(hashlib.sha256(repr((facts, spec)).encode()).hexdigest()[:32] for spec in specs),
             max_faces,
+            digest,
         )
         for specs in groups
     ]
@@ -220,9 +229,15 @@ def _entry_with_key(task: _ConvertTask, k: int) -> ModelEntry | None:
 
 @lru_cache(maxsize=8)
 def _opened(
-    library: Path,
+    library: Path, digest: str
 ) -> tuple[ModelFiles, dict[str, dict[str, str]], dict[str, MtlEntry]]:
-    """Return a library with its catalogue and default materials; open once in each process."""
+    """Return a library with its catalogue and default materials; open once in each process.
+
+    Args:
+        library: Archive or folder.
+        digest: Of its content: a library that was replaced in between is opened anew.
+    """
+    del digest
     if library.is_dir():
         return FolderFiles(library), {}, {}
     files = ZipFiles(library)
@@ -231,7 +246,7 @@ def _opened(
 
 def _convert(task: _ConvertTask) -> list[ModelEntry | tuple[str, str]]:
     """Return index entries of the models that were written, and id and reason of failures."""
-    files, catalogue, defaults = _opened(task.library)
+    files, catalogue, defaults = _opened(task.library, task.digest)
     models = convert_models(task.specs, files, catalogue, defaults, task.max_faces)
     results: list[ModelEntry | tuple[str, str]] = []
     for spec, key, model in zip(task.specs, task.keys, models, strict=True):

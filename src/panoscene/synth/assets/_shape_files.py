@@ -5,6 +5,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -146,7 +147,7 @@ def _lighter(
     try:
         import fast_simplification  # noqa: PLC0415 - optional
     except ImportError as error:
-        hint = "watertight meshes need fast-simplification: pip install panoscene[synth]"
+        hint = "watertight meshes need fast-simplification: pip install 'panoscene[synth]'"
         raise AssetError("fast-simplification", hint) from error
     if len(surface.faces) <= _MESH_FACES:
         return surface.vertices, surface.faces
@@ -193,10 +194,12 @@ def read_shape(cache: Path, identifier: str) -> ShapeSamples:
         raise AssetError(path, f"no shape of {identifier}; run 'panoscene synth assets --shapes'")
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            if int(content["version"]) != _SHAPE_VERSION:
-                raise AssetError(path, f"expected version {_SHAPE_VERSION}; sample it again")
+            version, scale = int(content["version"]), float(content["scale"])
             names = [part.name for part in fields(ShapeSamples) if part.name != "scale"]
             arrays = {name: content[name] for name in names}
-            return ShapeSamples(**arrays, scale=float(content["scale"]))
-    except (OSError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error,
+            TokenError, SyntaxError) as error:  # fmt: skip
         raise AssetError(path, f"damaged shape file: {error}") from error
+    if version != _SHAPE_VERSION:
+        raise AssetError(path, f"expected version {_SHAPE_VERSION}; sample it again")
+    return ShapeSamples(**arrays, scale=scale)

@@ -63,7 +63,7 @@ def close_surface(model: CadModel, resolution: int = RESOLUTION) -> ClosedSurfac
     try:
         from skimage.measure import marching_cubes  # noqa: PLC0415 - optional
     except ImportError as error:
-        hint = "watertight meshes need scikit-image: pip install panoscene[synth]"
+        hint = "watertight meshes need scikit-image: pip install 'panoscene[synth]'"
         raise AssetError("scikit-image", hint) from error
     extent = np.ptp(model.vertices, axis=0).astype(np.float64)
     scale = float(extent.max())

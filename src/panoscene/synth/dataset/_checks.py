@@ -168,7 +168,10 @@ def check_points(panorama: Loaded) -> list[str]:
             problems.append(f"{label.id}: {shares[k]:.1%} of its points are outside its box")
         elif _is_clear(label):
             mine = slice(found.start[k], found.start[k + 1])
-            gap = _largest_gap(points[mine], found.eye[k], found.half[k], found.distance[mine])
+            gap = _largest_gap(
+                points[mine], found.eye[k], found.half[k], found.distance[mine],
+                panorama.instance.shape[1],
+            )  # fmt: skip
             if gap is not None:
                 problems.append(f"{label.id}: its points end {gap:.2g} m before a face of its box")
     return problems
@@ -266,13 +269,13 @@ def _is_clear(label: ObjectLabel) -> bool:
 
 
 def _largest_gap(
-    points: np.ndarray, eye: np.ndarray, half: np.ndarray, distance: np.ndarray
+    points: np.ndarray, eye: np.ndarray, half: np.ndarray, distance: np.ndarray, columns: int
 ) -> float | None:
     """Return how far points end before a face that looks at the camera, None if near enough.
 
     Thin tips fall between pixels: a tenth of the size and two pixels are let pass.
     """
-    pixel = 2 * np.pi / 1024 * float(np.median(distance))
+    pixel = 2 * np.pi / columns * float(np.median(distance))
     allowed = 0.02 + 0.2 * half + 2 * pixel
     gap = np.where(
         eye > half, half - points.max(axis=0),

@@ -1,7 +1,6 @@
 """Layouts in the text files that HorizonNet is trained on."""
 
 import math
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -74,12 +73,12 @@ def _export_item(item: PanoramaItem, folder: Path) -> Path:
     rotation = torch.tensor(scene.panorama.upright_from_photo, dtype=torch.float64)
     source = item.image_file()
     if torch.equal(rotation, torch.eye(3, dtype=torch.float64)):
-        shutil.copyfile(source, folder / "img" / (item.name + source.suffix))
+        write_atomically(folder / "img" / (item.name + source.suffix), source.read_bytes())
     else:
         left, _, right = torch.linalg.svd(rotation)
         turned = rotate_panorama(item.image(), left @ right)
         pixels = (turned * 255 + 0.5).clamp(0, 255).byte().permute(1, 2, 0).numpy()
-        (folder / "img" / f"{item.name}.jpg").write_bytes(jpeg_bytes(pixels, 95))
+        write_atomically(folder / "img" / f"{item.name}.jpg", jpeg_bytes(pixels, 95))
     path = folder / "label_cor" / f"{item.name}.txt"
     lines = "".join(f"{x:.4f} {y:.4f}\n" for x, y in horizonnet_corners(scene))
     write_atomically(path, lines)

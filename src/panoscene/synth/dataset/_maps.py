@@ -1,11 +1,12 @@
 """The picture files of a panorama: what their pixels mean, written and read."""
 
 import io
+import warnings
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, Int32, UInt8, UInt16
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from ._errors import DatasetError
 
@@ -79,10 +80,14 @@ def read_rgb(path: Path) -> UInt8[np.ndarray, "height width 3"]:
 
 def _pixels(path: Path) -> np.ndarray:
     try:
-        with Image.open(path, formats=("PNG", "JPEG")) as picture:
-            if picture.width * picture.height > _MAX_PIXELS:
-                found = f"{picture.width} x {picture.height} pixels"
-                raise DatasetError(path, f"found {found}, expected at most {_MAX_PIXELS}")
-            return np.array(picture)
-    except (OSError, SyntaxError, UnidentifiedImageError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path, formats=("PNG", "JPEG")) as picture:
+                size = picture.size
+                values = np.array(picture) if size[0] * size[1] <= _MAX_PIXELS else None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DatasetError(path, f"expected a picture, found: {error}") from None
+    if values is None:
+        found = f"{size[0]} x {size[1]} pixels"
+        raise DatasetError(path, f"found {found}, expected at most {_MAX_PIXELS}")
+    return values

@@ -19,11 +19,11 @@ from panoscene.geometry import (
     pixel_in_perspective,
     sample_panorama,
 )
-from panoscene.scene import Scene, category_index
+from panoscene.scene import Scene, category_index, write_atomically
 from panoscene.style import ALARM, GROUP_COLOURS, INK, PAPER, SMALL, group_of, words
 
 from ._format import ObjectLabel
-from ._maps import DISTANCE, INSTANCE, MILLIMETRES, read_map, read_rgb
+from ._maps import DISTANCE, INSTANCE, MILLIMETRES, jpeg_bytes, read_map, read_rgb
 from ._read import PanoramaItem, open_dataset
 from ._semantic import SEMANTIC_NAMES
 
@@ -81,7 +81,7 @@ def write_contact_sheets(
     for number, start in enumerate(range(0, len(names), each)):
         sheet = contact_sheet(root, names=names[start : start + each], layer=layer, columns=columns)
         files.append(folder / f"{layer}-{number:03d}.jpg")
-        sheet.save(files[-1], quality=90)
+        write_atomically(files[-1], jpeg_bytes(np.asarray(sheet), 90))
     return files
 
 

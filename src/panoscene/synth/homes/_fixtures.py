@@ -1,9 +1,8 @@
-"""What belongs to the building: doors and windows, heaters, ceiling lamps, curtains, sockets."""
+"""What belongs to the building: doors, windows and heaters."""
 
 from collections.abc import Callable
 
 import numpy as np
-import shapely
 
 from ._library import ModelSummary
 from ._manhattan import walls_of
@@ -127,72 +126,3 @@ def _under(space: Space, item: Item, opening: Opening) -> bool:
     centre = np.array([[*place, bottom + item.size[2] / 2]])
     piece = space.put(item, centre, walls.yaw[[wall]], companion=True, wall=np.array([wall]))
     return piece is not None
-
-
-def ceiling_lamps(space: Space) -> None:
-    """Hang lamps from the ceiling: in the middle, and two in long rooms; over tables as well."""
-    stock = space.stock
-    item = stock.take("", where=lambda model: model.placement == "ceiling")
-    if item is None:
-        return
-    polygon = shapely.Polygon(space.room.polygon)
-    extent = np.ptp(space.room.polygon, axis=0)
-    middle = np.array(polygon.centroid.coords[0])
-    inside = polygon.buffer(-0.5, join_style="mitre")
-    long = int(extent.argmax())
-    step = np.zeros(2)
-    if extent.max() > 5.2 and extent.max() > 1.35 * extent.min():
-        step[long] = extent[long] / 4
-    places = [middle - step, middle + step] if step.any() else [middle]
-    height = min(float(item.size[2]), space.ceiling - 1.95)
-    hung = Item(item.model, np.array([item.size[0], item.size[1], height]), item.look)
-    for wanted in places:
-        place = wanted
-        if not inside.covers(shapely.Point(wanted)) and not inside.is_empty:
-            place = np.array(inside.representative_point().coords[0])
-        centre = np.array([[*place, space.ceiling - height / 2]])
-        space.put(hung, centre, np.zeros(1), companion=True)
-
-
-def curtains(space: Space) -> None:
-    """Hang curtains on both sides of windows in rooms where people live."""
-    if space.room.kind in ("bathroom", "laundry", "kitchen", "hall") or space.rng.random() < 0.35:
-        return
-    item = space.stock.take(
-        "", width=(0.25, 0.75), height=(1.4, space.ceiling - 0.05), depth=(0.03, 0.2),
-        where=lambda model: model.placement == "wall" and model.size[2] > 1.2,
-    )  # fmt: skip
-    if item is None:
-        return
-    walls = space.walls
-    for opening in space.openings:
-        if opening.kind != "window":
-            continue
-        top = min(opening.top + 0.16, space.ceiling - 0.02)
-        long = opening.bottom < 0.3 or space.rng.random() < 0.6
-        bottom = 0.03 if long else max(0.03, opening.bottom - 0.2)
-        size = np.array([item.size[0], min(item.size[1], 0.14), top - bottom])
-        hung = Item(item.model, size, item.look)
-        for side in (-1.0, 1.0):
-            middle = opening.start + opening.width / 2
-            middle += side * (opening.width + size[0] + 0.02) / 2
-            length = walls.length[opening.wall]
-            if not size[0] / 2 <= middle <= length - size[0] / 2:
-                continue
-            place = walls.start[opening.wall] + walls.along[opening.wall] * middle
-            place = place + walls.normal[opening.wall] * (size[1] / 2 + 0.01)
-            centre = np.array([[*place, (top + bottom) / 2]])
-            space.put(
-                hung, centre, walls.yaw[[opening.wall]], companion=True,
-                wall=np.array([opening.wall]),
-            )  # fmt: skip
-
-
-def sockets(space: Space) -> None:
-    """Put some sockets low on the walls and a switch beside each door."""
-    item = space.stock.take(
-        "", width=(0.05, 0.3), height=(0.05, 0.12), depth=(0.003, 0.04),
-        where=lambda model: model.placement == "wall",
-    )  # fmt: skip
-    for _ in range(int(space.rng.integers(1, 5)) if item is not None else 0):
-        at_wall(space, item, bottom=0.27, corner=0.0, companion=True, tries=8)

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ._fixtures import ceiling_lamps, curtains, door_piece, heaters, sockets, window_piece
+from ._fixtures import door_piece, heaters, window_piece
 from ._groups_sleeping import double_bed, wardrobe
+from ._hangings import ceiling_lamps, curtains, sockets, switches
 from ._library import ModelLibrary
 from ._manhattan import area_of
 from ._recipes import FIRST, HOBBIES, MORE, Group
@@ -101,6 +102,7 @@ def _twin(home: Home, index: int) -> int:
 
 def _furnish_room(space: Space, home: Home) -> None:
     rng, kind = space.rng, space.room.kind
+    switches(space)
     late_heaters = kind in ("kitchen", "bathroom", "laundry", "open_plan")
     if not late_heaters:
         heaters(space)
@@ -115,11 +117,11 @@ def _furnish_room(space: Space, home: Home) -> None:
         first += [(group, 0.9) for group in hobby]
     for group, probability in first:
         if rng.random() < probability:
-            _add(space, group, tries=3)
+            _add(space, group, tries=5)
     more = MORE[kind]
     weight = np.array(list(more.values()))
     area = area_of(space.room.polygon)
-    count = int(np.round(np.sqrt(area) * (0.1 + 2.5 * space.density) * rng.uniform(0.75, 1.25)))
+    count = int(np.round(np.sqrt(area) * (0.4 + 2.2 * space.density) * rng.uniform(0.75, 1.25)))
     for _ in range(count):
         group = list(more)[int(rng.choice(len(weight), p=weight / weight.sum()))]
         _add(space, group)

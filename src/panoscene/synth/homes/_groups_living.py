@@ -5,6 +5,7 @@ import numpy as np
 from ._putting import above, at_wall, beside, carpet, free_standing, near, on_top
 from ._space import Piece, Space
 from ._stock import Item
+from ._things import ON_CHEST, ON_COFFEE_TABLE, ON_DINING_TABLE, ON_SHELF, things_on
 
 
 def television(space: Space) -> Piece | None:
@@ -93,11 +94,14 @@ def _at(space: Space, piece: Piece, wall: int | None) -> Piece:
 
 def seating(space: Space) -> Piece | None:
     """Add a sofa at a wall with a coffee table in front of it and chairs around that."""
-    sofa = at_wall(space, space.stock.take("sofa"), access=0.85, corner=0.2)
-    if sofa is None:
-        return armchair(space)
-    around_sofa(space, sofa, table_front=2.0)
-    return sofa
+    for access in (0.85, 0.85, 0.85, 0.7, 0.7, 0.6, 0.6):
+        mark = space.mark()
+        sofa = at_wall(space, space.stock.take("sofa"), access=access, corner=0.2)
+        if sofa is not None and space.has_free_ways():
+            around_sofa(space, sofa, table_front=2.0)
+            return sofa
+        space.rollback(mark)
+    return armchair(space)
 
 
 def around_sofa(space: Space, sofa: Piece, *, table_front: float) -> None:
@@ -109,7 +113,7 @@ def around_sofa(space: Space, sofa: Piece, *, table_front: float) -> None:
         carpet(space, rug, centre, sofa.yaw)
     _armchairs(space, sofa, table)
     if table is not None:
-        things_on(space, table, 1.0, "laptop", "plant", "", "", "")
+        things_on(space, table, 1.3, *ON_COFFEE_TABLE)
     cushions(space, sofa, int(space.rng.integers(1, 4)) if space.maybe(0.65) else 0)
     if sofa.wall is not None:
         pictures_above(space, sofa)
@@ -190,33 +194,9 @@ def pictures_above(space: Space, lead: Piece) -> None:
         above(space, item, lead, low, shift=space.rng.uniform(-0.1, 0.1))
 
 
-def things_on(space: Space, lead: Piece, most: float, *names: str) -> None:
-    """Put things of some categories on a piece: about ``most`` at middle density."""
-    count = int(space.rng.poisson(most * 2.0 ** (2.0 * space.density - 1.0)))
-    for _ in range(min(count, 4)):
-        name = space.pick(*names)
-        if name == "":
-            item = small_decoration(space)
-        else:
-            item = space.stock.take(
-                name, width=(0.05, 0.6), depth=(0.05, 0.5),
-                height=(0.05, 0.55) if name == "plant" else None,
-            )  # fmt: skip
-        turn = space.rng.uniform(-0.3, 0.3) if name in ("", "laptop") else 0.0
-        on_top(space, item, lead, back=0.55, spread=0.6, turn=turn)
-
-
-def small_decoration(space: Space) -> Item | None:
-    """Return a book, vase, bowl or bottle."""
-    return space.stock.take(
-        "", width=(0.03, 0.45), depth=(0.03, 0.45), height=(0.01, 0.5),
-        where=lambda model: model.placement == "on_top",
-    )  # fmt: skip
-
-
 def dining(space: Space) -> Piece | None:
     """Add a table with chairs that face it, mostly free-standing, sometimes at a wall."""
-    rng, stock = space.rng, space.stock
+    stock = space.stock
     for attempt in range(6):
         mark = space.mark()
         most = 2.3 - 0.3 * attempt
@@ -234,23 +214,30 @@ def dining(space: Space) -> Piece | None:
             sides = (np.pi,)
         if table is None:
             continue
-        seats = max(1, int((table.size[0] + 0.05) / max(0.58, chair.size[0] + 0.06)))
-        for facing in sides:
-            for seat in range(seats):
-                if rng.random() < 0.93:
-                    along_side = ((seat + 0.5) / seats - 0.5) * table.size[0]
-                    chair_at(space, table, chair, facing, along_side)
-        for facing in (np.pi / 2, -np.pi / 2):
-            if rng.random() < (0.45 if seats < 3 else 0.25) + 0.3 * (seats == 1):
-                chair_at(space, table, chair, facing, 0.0)
-        if space.has_free_ways():
-            things_on(space, table, 1.0, "", "", "", "plant", "laptop")
-            if space.maybe(0.3):
+        chairs = _chairs(space, table, chair, sides)
+        if chairs >= min(2, len(sides)) and space.has_free_ways():
+            things_on(space, table, 1.6, *ON_DINING_TABLE)
+            if table.wall is None and space.maybe(0.3):
                 rug = stock.take("carpet", width=(1.4, 3.2), depth=(1.2, 2.6), height=(0.002, 0.02))
                 carpet(space, rug, table.centre[:2], table.yaw)
             return table
         space.rollback(mark)
     return None
+
+
+def _chairs(space: Space, table: Piece, chair: Item, sides: tuple[float, ...]) -> int:
+    """Put chairs along the long sides of a table and perhaps at its ends; return how many."""
+    rng, count = space.rng, 0
+    seats = max(1, int((table.size[0] + 0.05) / max(0.58, chair.size[0] + 0.06)))
+    for facing in sides:
+        for seat in range(seats):
+            if rng.random() < 0.93:
+                along_side = ((seat + 0.5) / seats - 0.5) * table.size[0]
+                count += chair_at(space, table, chair, facing, along_side) is not None
+    for facing in (np.pi / 2, -np.pi / 2):
+        if rng.random() < (0.45 if seats < 3 else 0.25) + 0.3 * (seats == 1):
+            count += chair_at(space, table, chair, facing, 0.0) is not None
+    return count
 
 
 def chair_at(
@@ -312,7 +299,7 @@ def sideboard(space: Space) -> Piece | None:
     if placed is not None:
         if space.maybe(0.35):
             on_top(space, space.stock.take("table_lamp"), placed, right=space.side() * 0.8)
-        things_on(space, placed, 1.0, "", "plant", "speaker_system", "loudspeaker", "")
+        things_on(space, placed, 1.4, *ON_CHEST, "speaker_system", "loudspeaker")
         over = space.pick("picture", "picture", "mirror", "wall_clock")
         if over == "picture":
             pictures_above(space, placed)
@@ -332,16 +319,18 @@ def bookcase(space: Space) -> Piece | None:
     item = space.stock.take("shelf", height=(0.7, min(2.4, space.ceiling - 0.05)))
     placed = at_wall(space, item, access=0.55, corner=0.5)
     if placed is not None:
-        things_on(space, placed, 1.3, "", "", "plant", "speaker_system", "loudspeaker")
+        things_on(space, placed, 1.8, *ON_SHELF, "loudspeaker")
         if space.maybe(0.25):
             second = beside(space, placed.item, placed, space.side(), access=0.55)
             if second is not None:
-                things_on(space, second, 1.0, "", "", "plant")
+                things_on(space, second, 1.5, *ON_SHELF)
     return placed
 
 
 def large_clock(space: Space) -> Piece | None:
-    """Add a grandfather clock."""
+    """Add a grandfather clock where there is no clock yet."""
+    if space.count("wall_clock", "grandfather_clock"):
+        return None
     item = space.stock.take("grandfather_clock", height=(1.5, space.ceiling - 0.05))
     return at_wall(space, item, access=0.4, corner=0.4)
 
@@ -355,7 +344,8 @@ def divider(space: Space) -> Piece | None:
         mark = space.mark()
         walls = space.walls
         wall = int(space.rng.choice(len(walls.length), p=walls.length / walls.length.sum()))
-        if walls.length[wall] < 3.0:
+        lit = any(o.wall == wall and o.kind == "window" for o in space.openings)
+        if walls.length[wall] < 3.0 or lit or space.count("fence") > 0:
             continue
         place = walls.start[wall] + walls.normal[wall] * item.size[0] / 2
         place = place + walls.along[wall] * space.rng.uniform(0.3, 0.7) * walls.length[wall]

@@ -2,22 +2,26 @@
 
 import numpy as np
 
-from ._groups_living import pictures_above, things_on
+from ._groups_living import pictures_above
 from ._putting import above, along, at_wall, beside, carpet, free_standing, on_top
 from ._space import Piece, Space
+from ._things import IN_BATHROOM, ON_CHEST, things_on
 
 
 def bathroom(space: Space) -> Piece | None:
     """Add a bathtub or shower, a toilet and a basin: all three where there is room for them."""
     lavatory = space.rng.random() < 0.06
-    for attempt in range(16):
+    for attempt in range(24):
         mark = space.mark()
-        tub = None if lavatory else bath(space)
+        small = lavatory or attempt >= 16  # no room to bathe in
+        tub = None if small else bath(space)
         seat = toilet(space)
         lead = basin(space)
         placed = [piece for piece in (tub, seat, lead) if piece is not None]
-        enough = 3 - lavatory - (attempt >= 10) - (attempt >= 14)
-        if placed and len(placed) >= enough and space.has_free_ways():
+        enough = 1 if attempt >= 22 else 2 if small else 3
+        if len(placed) >= enough and space.has_free_ways():
+            if attempt >= 16 and not lavatory:
+                bath(space)
             return placed[0]
         space.rollback(mark)
     return None
@@ -92,7 +96,7 @@ def towels(space: Space) -> Piece | None:
     if item is None:
         return None
     bottom = float(space.rng.uniform(1.2, 1.4) - item.size[2] / 2)
-    return at_wall(space, item, bottom=max(bottom, 0.3), corner=0.0, companion=True)
+    return at_wall(space, item, bottom=max(bottom, 0.3), corner=0.0, small=True)
 
 
 def washing(space: Space) -> Piece | None:
@@ -105,7 +109,7 @@ def washing(space: Space) -> Piece | None:
                 dryer = space.stock.take("dryer")
                 if beside(space, dryer, washer, turn, gap=0.02, access=0.65) is not None:
                     break
-        things_on(space, washer, 0.5, "", "basket")
+        things_on(space, washer, 0.7, "towels", "basket", "bottles", "small_box")
         if space.maybe(0.3):
             above(space, space.stock.take("top_cabinet", depth=(0.2, 0.42)), washer, 1.45)
     return washer
@@ -113,7 +117,7 @@ def washing(space: Space) -> Piece | None:
 
 def laundry_basket(space: Space) -> Piece | None:
     """Add a basket."""
-    return at_wall(space, space.stock.take("basket"), corner=0.7, companion=True)
+    return at_wall(space, space.stock.take("basket"), corner=0.7)
 
 
 def bath_mat(space: Space) -> Piece | None:
@@ -139,7 +143,16 @@ def bath_cabinet(space: Space) -> Piece | None:
     )
     placed = at_wall(space, item, access=0.45, corner=0.6)
     if placed is not None:
-        things_on(space, placed, 1.0, "", "", "plant", "basket")
+        things_on(space, placed, 1.2, *IN_BATHROOM)
+    return placed
+
+
+def towel_shelf(space: Space) -> Piece | None:
+    """Add a small shelf with towels."""
+    item = space.stock.take("shelf", width=(0.35, 0.85), height=(0.6, 1.75))
+    placed = at_wall(space, item, access=0.4, corner=0.7)
+    if placed is not None:
+        things_on(space, placed, 1.6, *IN_BATHROOM)
     return placed
 
 
@@ -160,7 +173,7 @@ def entrance(space: Space) -> Piece | None:
         pictures_above(space, placed)
     if space.maybe(0.4):
         on_top(space, space.stock.take("table_lamp"), placed, right=space.side() * 0.8)
-    things_on(space, placed, 0.8, "", "", "plant")
+    things_on(space, placed, 1.0, *ON_CHEST)
     return placed
 
 
@@ -205,7 +218,7 @@ def picture(space: Space) -> Piece | None:
         return None
     middle = space.rng.uniform(1.45, 1.65)
     bottom = float(min(middle - item.size[2] / 2, space.ceiling - 0.15 - item.size[2]))
-    first = at_wall(space, item, bottom=bottom, corner=0.0, companion=True)
+    first = at_wall(space, item, bottom=bottom, corner=0.0, small=True)
     if first is not None and item.size[0] < 0.7 and space.maybe(0.35):
         step = item.size[0] + space.rng.uniform(0.06, 0.18)
         for k in range(1, int(space.rng.integers(2, 4))):
@@ -224,7 +237,7 @@ def wall_clock(space: Space) -> Piece | None:
     bottom = float(
         min(space.rng.uniform(1.85, 2.05) - item.size[2] / 2, space.ceiling - 0.15 - item.size[2])
     )
-    return at_wall(space, item, bottom=bottom, corner=0.0, companion=True)
+    return at_wall(space, item, bottom=bottom, corner=0.0, small=True)
 
 
 def wall_mirror(space: Space) -> Piece | None:
@@ -253,7 +266,7 @@ def floor_lamp(space: Space) -> Piece | None:
 def trash_can(space: Space) -> Piece | None:
     """Add a trash can in a corner."""
     item = space.stock.take("trash_can")
-    return at_wall(space, item, corner=0.6, gap=0.02, companion=True)
+    return at_wall(space, item, corner=0.6, gap=0.02)
 
 
 def basket(space: Space) -> Piece | None:
@@ -287,7 +300,9 @@ def high_cabinet(space: Space) -> Piece | None:
 
 
 def loose_chair(space: Space) -> Piece | None:
-    """Add a chair at a wall, its back to it."""
+    """Add a chair at a wall, its back to it, if there is none yet."""
+    if any(p.category == "chair" and p.wall is not None for p in space.pieces):
+        return None
     return at_wall(
         space, space.stock.take("chair", height=(0.7, 1.2)), access=0.3, corner=0.3, gap=0.04
     )

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from ._groups_living import bookcase, chair_at, cushions, pictures_above, things_on
+from ._groups_living import bookcase, chair_at, cushions, pictures_above
 from ._putting import above, at_wall, beside, carpet, free_standing, near, on_top
 from ._space import Piece, Space
+from ._things import ON_CHEST, ON_DESK, ON_SHELF, things_on, toys_on_floor
 
 
 def double_bed(space: Space) -> Piece | None:
@@ -30,15 +31,8 @@ def single_bed(space: Space) -> Piece | None:
 def around_bed(space: Space, bed: Piece) -> None:
     """Add what belongs to a bed: chests with lamps, cushions, a carpet, a picture, a bench."""
     stock, rng = space.stock, space.rng
-    chest = stock.take("chest", width=(0.33, 0.62), depth=(0.3, 0.55), height=(0.33, 0.66))
-    lamp = stock.take("table_lamp", height=(0.2, 0.65))
     high = bed.size[2] > 1.35
-    for side in (-1.0, 1.0):
-        if chest is not None and rng.random() < 0.8:
-            gap = float(rng.uniform(0.01, 0.08))
-            placed = beside(space, chest, bed, side, gap=gap)
-            if placed is not None and rng.random() < 0.75:
-                on_top(space, lamp, placed, back=0.6)
+    _nightstands(space, bed)
     if not high and space.maybe(0.6):
         cushions(space, bed, int(rng.integers(1, 3)))
     if space.maybe(0.45):
@@ -66,6 +60,21 @@ def around_bed(space: Space, bed: Piece) -> None:
                 space.rollback(mark)
 
 
+def _nightstands(space: Space, bed: Piece) -> None:
+    """Add equal chests with equal lamps on both sides of a bed."""
+    stock, rng = space.stock, space.rng
+    chest = stock.take("chest", width=(0.33, 0.62), depth=(0.3, 0.55), height=(0.33, 0.66))
+    lamp = stock.take("table_lamp", height=(0.2, 0.65))
+    for side in (-1.0, 1.0):
+        if chest is None or rng.random() > 0.8:
+            continue
+        placed = beside(space, chest, bed, side, gap=float(rng.uniform(0.01, 0.08)))
+        if placed is not None:
+            if rng.random() < 0.75:
+                on_top(space, lamp, placed, back=0.6)
+            things_on(space, placed, 0.5, "books", "books", "dishes", "candles", "vase")
+
+
 def wardrobe(space: Space) -> Piece | None:
     """Add a wardrobe, sometimes two side by side."""
     placed = None
@@ -90,7 +99,7 @@ def dresser(space: Space) -> Piece | None:
             above(space, space.stock.take("mirror", height=(0.4, 1.1)), placed, 1.05)
         else:
             pictures_above(space, placed)
-        things_on(space, placed, 1.0, "", "", "plant", "table_lamp")
+        things_on(space, placed, 1.4, *ON_CHEST)
         if space.maybe(0.12):
             on_top(space, space.stock.take("standing_tv", width=(0.4, 1.0)), placed)
     return placed
@@ -134,7 +143,7 @@ def desk(space: Space) -> Piece | None:
         )
     if space.maybe(0.15):
         on_top(space, stock.take("loudspeaker", height=(0.15, 0.4)), table, back=0.9, spread=0.05)
-    things_on(space, table, 0.8, "", "", "", "plant", "speaker_system")
+    things_on(space, table, 1.2, *ON_DESK)
     if space.maybe(0.35):
         pictures_above(space, table)
     if space.maybe(0.4):
@@ -148,11 +157,12 @@ def crib(space: Space) -> Piece | None:
 
 
 def toys(space: Space) -> Piece | None:
-    """Add a basket, sometimes on a small carpet."""
+    """Add a basket with toys around it, sometimes on a small carpet."""
     basket = at_wall(space, space.stock.take("basket"), corner=0.4)
     if basket is not None and space.maybe(0.3):
         rug = space.stock.take("carpet", width=(0.8, 2.0), depth=(0.8, 2.0), height=(0.002, 0.02))
         carpet(space, rug, basket.place(0.0, 1.0), basket.yaw)
+    toys_on_floor(space, basket)
     return basket
 
 
@@ -213,5 +223,5 @@ def office_shelves(space: Space) -> Piece | None:
     )
     placed = at_wall(space, item, access=0.6, corner=0.5)
     if placed is not None:
-        things_on(space, placed, 1.2, "", "", "plant", "coffee_machine", "loudspeaker")
+        things_on(space, placed, 1.4, *ON_SHELF, "coffee_machine", "loudspeaker")
     return placed

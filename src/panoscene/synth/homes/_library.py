@@ -135,14 +135,34 @@ _STAND_INS: dict[str, tuple[tuple[float, ...], tuple[float, ...], str, float]] =
 }
 """Least and largest size, placement and elevation of parametric models."""
 _DECORATION: dict[str, tuple[tuple[float, ...], tuple[float, ...], str, float]] = {
-    "curtain": ((0.35, 0.10, 2.10), (0.70, 0.16, 2.40), "wall", 0.03),
+    "curtain": ((1.20, 0.10, 2.00), (2.80, 0.14, 2.50), "wall", 0.05),
     "ceiling_lamp": ((0.30, 0.30, 0.12), (0.60, 0.60, 0.55), "ceiling", 0.0),
     "books": ((0.15, 0.15, 0.04), (0.32, 0.22, 0.25), "on_top", 0.0),
-    "bottle": ((0.06, 0.06, 0.18), (0.10, 0.10, 0.33), "on_top", 0.0),
+    "bottles": ((0.06, 0.06, 0.18), (0.35, 0.10, 0.33), "on_top", 0.0),
     "vase": ((0.10, 0.10, 0.18), (0.20, 0.20, 0.38), "on_top", 0.0),
-    "bowl": ((0.18, 0.18, 0.06), (0.32, 0.32, 0.12), "on_top", 0.0),
+    "dishes": ((0.18, 0.18, 0.06), (0.32, 0.32, 0.12), "on_top", 0.0),
+    "candles": ((0.08, 0.08, 0.10), (0.25, 0.10, 0.30), "on_top", 0.0),
+    "towels": ((0.28, 0.20, 0.10), (0.33, 0.24, 0.22), "on_top", 0.0),
+    "small_box": ((0.16, 0.14, 0.09), (0.36, 0.28, 0.25), "on_top", 0.0),
+    "toys": ((0.25, 0.20, 0.12), (0.45, 0.40, 0.45), "floor", 0.0),
     "socket": ((0.08, 0.01, 0.08), (0.16, 0.02, 0.08), "wall", 0.3),
+    "switch": ((0.08, 0.01, 0.08), (0.09, 0.02, 0.22), "wall", 1.05),
 }
+
+
+def kind_of(model: ModelSummary) -> str:
+    """Return what a model is: its category or, for decoration, its kind; "" when that is unknown.
+
+    Decoration is told apart by ids of the form ``parametric/<kind>/<seed>``.
+
+    Examples:
+        >>> kind_of(Summary("parametric/vase/3", "", (0.1, 0.1, 0.3), "on_top"))
+        'vase'
+    """
+    if model.category:
+        return model.category
+    source, _, rest = model.id.partition("/")
+    return rest.partition("/")[0] if source == "parametric" else ""
 
 
 def summary_library(models: Iterable[ModelSummary]) -> SummaryLibrary:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -71,12 +72,21 @@ def corners_of(shape: shapely.Geometry) -> Float[np.ndarray, "corners 2"] | None
 
 
 def walls_of(polygon: Float[np.ndarray, "corners 2"]) -> Walls:
-    """Return the walls of a room."""
+    """Return the walls of a room; those of the last rooms are remembered."""
+    return _walls(np.ascontiguousarray(polygon, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=256)
+def _walls(corners: bytes) -> Walls:
+    polygon = np.frombuffer(corners).reshape(-1, 2)
     step = np.concatenate((polygon[1:], polygon[:1])) - polygon
     length = np.abs(step).sum(axis=1)
     along = np.round(step / length[:, None])
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    return Walls(polygon, along, normal, length, np.arctan2(along[:, 1], along[:, 0]))
+    yaw = np.arctan2(along[:, 1], along[:, 0])
+    for array in (along, normal, length, yaw):
+        array.flags.writeable = False
+    return Walls(polygon, along, normal, length, yaw)
 
 
 def inset(

@@ -35,8 +35,8 @@ SMALL: tuple[RoomKind, ...] = ("bathroom", "laundry")
 
 _ROOM_COUNT = {2: 0.08, 3: 0.12, 4: 0.16, 5: 0.22, 6: 0.20, 7: 0.13, 8: 0.09}
 _SPARE: dict[RoomKind, float] = {
-    "bedroom": 3.0, "child": 3.0, "office": 2.2, "dining": 1.6, "bathroom": 1.5, "laundry": 1.6,
-    "hobby": 1.7,
+    "bedroom": 2.6, "child": 3.4, "office": 2.2, "dining": 2.6, "bathroom": 1.4, "laundry": 1.7,
+    "hobby": 2.6,
 }  # fmt: skip
 _MOST: dict[RoomKind, int] = {"bedroom": 3, "child": 2, "bathroom": 2}
 

@@ -3,10 +3,13 @@
 import numpy as np
 from jaxtyping import Float
 
-from ._space import CARPET, Piece, Space
+from ._space import CARPET, SOLID, Piece, Space
 from ._stock import Item
 
 _TRIES = 32
+_BOARDS = ("shelf", "top_cabinet", "microwave")
+_BETWEEN_BOARDS = 0.27
+"""Metres that are free above a board inside a piece."""
 
 
 def at_wall(
@@ -19,7 +22,7 @@ def at_wall(
     corner: float = 0.25,
     gap: float = 0.0,
     tries: int = _TRIES,
-    companion: bool = False,
+    small: bool = False,
     least_wall: float = 0.0,
 ) -> Piece | None:
     """Return a piece put with its whole back at a wall, or None.
@@ -33,7 +36,7 @@ def at_wall(
         corner: probability that it stands in a corner of the room.
         gap: metres between its back and the wall.
         tries: number of places that are tried.
-        companion: whether it may stand in the access space of others.
+        small: whether it may be in the access space of others.
         least_wall: metres that the wall is long at least.
     """
     if item is None:
@@ -51,7 +54,7 @@ def at_wall(
     height = np.full((tries, 1), bottom + item.size[2] / 2)
     return space.put(
         item, np.hstack([centre, height]), yaw, access=access, sides=sides, wall=wall,
-        companion=companion,
+        small=small,
     )  # fmt: skip
 
 
@@ -114,13 +117,42 @@ def along(
         return None
     walls, wall = space.walls, lead.wall
     middle = float((lead.centre[:2] - walls.start[wall]) @ walls.along[wall]) + right
+    return along_wall(space, item, wall, middle, bottom=bottom, access=access, gap=gap)
+
+
+def along_wall(
+    space: Space,
+    item: Item,
+    wall: int,
+    middle: float,
+    *,
+    bottom: float = 0.0,
+    access: float = 0.0,
+    gap: float = 0.0,
+    small: bool = False,
+    kind: int = SOLID,
+) -> Piece | None:
+    """Return a piece put with its back at a place of a wall, or None.
+
+    Args:
+        space: the room.
+        item: what to put.
+        wall: index of the wall.
+        middle: metres from the wall's first corner to the middle of the piece.
+        bottom: height of the lower face.
+        access: metres in front that stay free.
+        gap: metres between its back and the wall.
+        small: whether it may be in the access space of others.
+        kind: of the box it fills.
+    """
+    walls = space.walls
     if middle < item.size[0] / 2 - 1e-6 or middle > walls.length[wall] - item.size[0] / 2 + 1e-6:
         return None
     place = walls.start[wall] + walls.along[wall] * middle
     place = place + walls.normal[wall] * (item.size[1] / 2 + gap)
     return space.put(
         item, np.array([[*place, bottom + item.size[2] / 2]]), np.array([walls.yaw[wall]]),
-        companion=True, access=access, wall=np.array([wall]),
+        companion=True, small=small, access=access, wall=np.array([wall]), kind=kind,
     )  # fmt: skip
 
 
@@ -186,12 +218,19 @@ def on_top(
     offsets = np.stack([shares, rear.clip(-1.0, 1.0)], axis=1) * spare / 2
     places = np.array([lead.place(x, y) for x, y in offsets])
     bottom = lead.bottom + lead.item.support
-    inner = lead.item.support < 0.85 * lead.size[2]
-    if inner and lead.category in ("shelf", "top_cabinet", "microwave") and item.size[2] > 0.27:
+    if item.size[2] > headroom(lead):
         return None
     centre = np.hstack([places, np.full((tries, 1), bottom + item.size[2] / 2)])
     yaw = np.full(tries, _wrap(lead.yaw + turn))
-    return space.put(item, centre, yaw, companion=True, support=lead)
+    return space.put(item, centre, yaw, small=True, support=lead)
+
+
+def headroom(lead: Piece) -> float:
+    """Return how high things on a piece can be: less on a board inside it than on its top."""
+    support = lead.item.support
+    if support is None or lead.category not in _BOARDS or support > 0.85 * lead.size[2]:
+        return 3.0
+    return _BETWEEN_BOARDS
 
 
 def free_standing(

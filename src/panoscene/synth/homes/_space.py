@@ -15,9 +15,10 @@ _TRIES = 32
 """Candidate places that are tested at once for one piece."""
 _ROWS = 700
 
-SOLID, ACCESS, DOORWAY, CARPET = 0, 1, 2, 3
+SOLID, ACCESS, DOORWAY, CARPET, WINDOW, CURTAIN = 0, 1, 2, 3, 4, 5
 """What a box in the room is: a thing; space that companions may use; space that nothing may use;
-something flat that only others of its sort may not overlap."""
+something flat that only others of its sort may not overlap; space that only curtains may use; a
+thing that may use it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +84,7 @@ class Space:
         self._high = np.zeros((3, _ROWS))
         self._kind = np.zeros(_ROWS, dtype=np.int64)
         self._owner = np.full(_ROWS, -1)
+        self._group = np.full(_ROWS, -1)
         self._used = 0
         self._corner = room.polygon.min(axis=0), room.polygon.max(axis=0)
         self.blocks = blocks_around(room.polygon)
@@ -150,6 +152,7 @@ class Space:
         sides: float = 0.0,
         behind: float = 0.0,
         companion: bool = False,
+        small: bool = False,
         support: Piece | None = None,
         kind: int = SOLID,
         wall: Int[np.ndarray, " k"] | None = None,
@@ -163,7 +166,8 @@ class Space:
             access: metres in front of the piece that must be free and stay free.
             sides: the same on its left and right.
             behind: the same behind it.
-            companion: whether it may stand in the access space of others.
+            companion: whether it may stand before windows and in the access space of its group.
+            small: whether it may be in the access space of all others.
             support: the piece it stands on.
             kind: of the box it fills.
             wall: index of the wall at which each candidate stands.
@@ -172,14 +176,16 @@ class Space:
             return None
         low, high = _bounds(item.size, centre, yaw)
         owner = -2 if support is None else self._index(support)
-        free = self._is_free(low, high, kind, companion=companion, ignore=owner)
+        in_way = self._in_way(kind, companion=companion, small=small)
+        free = self._is_free(low, high, in_way, ignore=owner)
         zone_low, zone_high = low, high
         if access > 0.0 or sides > 0.0 or behind > 0.0:
             grown = item.size + np.array([2 * sides, access + behind, 0.0])
             front = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)], axis=1)
             zone_low, zone_high = _bounds(grown, centre + front * (access - behind) / 2, yaw)
             zone_low[:, 2], zone_high[:, 2] = 0.05, 1.2
-            free &= self._is_free(zone_low, zone_high, ACCESS, companion=True, ignore=owner)
+            in_way = self._in_way(ACCESS, companion=True, small=True)
+            free &= self._is_free(zone_low, zone_high, in_way, ignore=owner)
         if not free.any() or self._used + 2 > _ROWS:
             return None
         best = int(free.argmax())
@@ -187,7 +193,7 @@ class Space:
         piece = Piece(item, centre[best], float(yaw[best]), support, self.group, at)
         self.pieces.append(piece)
         number = len(self.pieces) - 1
-        self._occupy(low[best], high[best], kind, number)
+        self._occupy(low[best], high[best], SOLID if kind == CURTAIN else kind, number)
         if access > 0.0 or sides > 0.0 or behind > 0.0:
             self._occupy(zone_low[best], zone_high[best], ACCESS, number)
         return piece
@@ -229,9 +235,9 @@ class Space:
             return np.array([*ends.min(axis=0), low]), np.array([*ends.max(axis=0), high])
 
         if opening.kind == "window":
-            self._occupy(*zone(0.10, opening.bottom - 0.03, opening.top + 0.06), SOLID)
+            self._occupy(*zone(0.10, opening.bottom - 0.03, opening.top + 0.06), WINDOW)
             if opening.bottom < 0.3:
-                self._occupy(*zone(0.65, 0.04, 2.0), DOORWAY)
+                self._occupy(*zone(0.65, 0.04, 2.0), WINDOW)
             else:
                 self._occupy(*zone(0.6, opening.bottom + 0.15, opening.top), ACCESS)
             return
@@ -250,34 +256,42 @@ class Space:
     ) -> None:
         self._low[:, self._used], self._high[:, self._used] = low, high
         self._kind[self._used], self._owner[self._used] = kind, owner
+        self._group[self._used] = self.group
         self._used += 1
+
+    def _in_way(self, kind: int, *, companion: bool, small: bool) -> Bool[np.ndarray, " used"]:
+        """Return which of the boxes so far a box of some kind may not touch."""
+        kinds, owners = self._kind[: self._used], self._owner[: self._used]
+        if kind == CARPET:
+            return (kinds == CARPET) | ((kinds == SOLID) & (owners < 0))
+        if kind == ACCESS:
+            return kinds == SOLID
+        meets = (kinds == SOLID) | (kinds == DOORWAY)
+        if kind != CURTAIN:
+            meets |= kinds == WINDOW
+        if companion:
+            of_others = (self._group[: self._used] != self.group) & (owners >= 0)
+            return meets | ((kinds == ACCESS) & of_others & (not small))
+        return meets if small else meets | (kinds == ACCESS)
 
     def _is_free(
         self,
         low: Float[np.ndarray, "k 3"],
         high: Float[np.ndarray, "k 3"],
-        kind: int,
+        in_way: Bool[np.ndarray, " used"],
         *,
-        companion: bool,
         ignore: int,
     ) -> Bool[np.ndarray, " k"]:
-        """Return which boxes lie in the room and touch nothing that they may not touch."""
+        """Return which boxes lie in the room and touch nothing that is in their way."""
         inside = (low[:, :2] >= self._corner[0] - _SLACK).all(axis=1)
         inside &= (high[:, :2] <= self._corner[1] + _SLACK).all(axis=1)
         inside &= high[:, 2] <= self.ceiling + _SLACK
-        kinds, owners = self._kind[: self._used], self._owner[: self._used]
-        if kind == CARPET:
-            meets = (kinds == CARPET) | ((kinds == SOLID) & (owners < 0))
-        elif kind == ACCESS:
-            meets = kinds == SOLID
-        else:
-            meets = (kinds == SOLID) | (kinds == DOORWAY)
-            if not companion:
-                meets |= kinds == ACCESS
-        meets = meets & (owners != ignore)
+        others = np.flatnonzero(in_way & (self._owner[: self._used] != ignore))
+        lower, upper = self._low[:, others] + _SLACK, self._high[:, others] - _SLACK
+        meets = np.ones((len(low), len(others)), dtype=bool)
         for axis in range(3):
-            meets = meets & (low[:, axis, None] < self._high[axis, : self._used] - _SLACK)
-            meets &= high[:, axis, None] > self._low[axis, : self._used] + _SLACK
+            meets &= low[:, axis, None] < upper[axis]
+            meets &= high[:, axis, None] > lower[axis]
         return inside & ~meets.any(axis=1)
 
 

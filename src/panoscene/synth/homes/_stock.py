@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from ._library import ModelLibrary, ModelSummary
+from panoscene.scene import CATEGORIES
+
+from ._library import ModelLibrary, ModelSummary, kind_of
 
 Range = tuple[float, float]
 _ANY: Range = (0.0, 20.0)
@@ -68,12 +70,18 @@ class Stock:
         self.rng = rng
         self._library = library
         self._models: dict[str, tuple[ModelSummary, ...]] = {}
+        self._decoration: dict[str, list[ModelSummary]] = {}
+        for model in library.models(""):
+            self._decoration.setdefault(kind_of(model), []).append(model)
         self._sizes: dict[str, Float[np.ndarray, "models 3"]] = {}
 
     def models(self, category: str) -> tuple[ModelSummary, ...]:
-        """Return all models of a category."""
+        """Return all models of a category or kind of decoration."""
         if category not in self._models:
-            models = tuple(self._library.models(category))
+            if category in CATEGORIES:
+                models = tuple(self._library.models(category))
+            else:
+                models = tuple(self._decoration.get(category, ()))
             self._models[category] = models
             self._sizes[category] = np.array([m.size for m in models]).reshape(-1, 3)
         return self._models[category]
@@ -93,7 +101,7 @@ class Stock:
         else fits.
 
         Args:
-            category: one of the 57, or "" for decoration.
+            category: one of the 57, or a kind of decoration.
             width: least and largest in metres; the usual ones when None.
             depth: the same.
             height: the same.

@@ -96,9 +96,16 @@ def _mujoco() -> Any:
     try:
         import mujoco  # noqa: PLC0415 - optional
     except ModuleNotFoundError as error:
-        hint = "settling furniture needs mujoco: pip install panoscene[synth]"
+        hint = "settling furniture needs mujoco: pip install 'panoscene[synth]'"
         raise ModuleNotFoundError(hint, name="mujoco") from error
-    return mujoco
+    # its own handler writes a log file into the user's folder
+    engine: Any = mujoco
+    engine.set_mju_user_warning(_say_nothing)
+    return engine
+
+
+def _say_nothing(message: str) -> None:
+    """Pass over a warning of the engine: what went wrong is seen in where things end."""
 
 
 def _add_room(mujoco: Any, spec: Any, polygon: Float64[np.ndarray, "corners 2"]) -> None:

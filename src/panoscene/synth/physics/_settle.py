@@ -82,7 +82,7 @@ def settle_home(
             notes.reports[index] = ObjectReport(index, placed.model, "fixed")
     numbers = {old: new for new, old in enumerate(sorted(settled))}
     kept = tuple(
-        replace(placed, support=None if placed.support is None else numbers[placed.support])
+        replace(placed, support=None if placed.support is None else numbers.get(placed.support))
         for _, placed in sorted(settled.items())
     )
     reports = tuple(report for _, report in sorted(notes.reports.items()))

@@ -3,9 +3,11 @@
 import hashlib
 import io
 import zipfile
+import zlib
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
@@ -85,7 +87,8 @@ def _read(path: Path) -> CollisionShape | None:
     try:
         with np.load(path, allow_pickle=False) as found:
             return CollisionShape(found["boxes"], found["state"], found["low"], found["step"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error,
+            TokenError, SyntaxError):  # fmt: skip
         return None
 
 

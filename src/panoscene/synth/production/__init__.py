@@ -8,6 +8,7 @@ from ._models import Models as Models
 from ._models import add_parametric_models as add_parametric_models
 from ._photographs import Extra as Extra
 from ._photographs import photograph_home as photograph_home
+from ._ray import render_with_ray as render_with_ray
 from ._run import RenderProgress as RenderProgress
 from ._run import RenderTask as RenderTask
 from ._run import begin_run as begin_run

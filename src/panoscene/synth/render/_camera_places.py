@@ -132,9 +132,13 @@ def free_floor(
         bottom, top, outline = _footprint(placed)
         if top < 0.06 or bottom > camera_height + 0.45:
             continue
-        inside = shapely.contains_xy(outline.buffer(_CELL / 2), grid_x, grid_y)
-        low |= inside
-        high |= inside & (top > lowest - 0.35)
+        grown = outline.buffer(_CELL / 2)
+        first = np.floor((np.array(grown.bounds[:2]) - origin) / _CELL).astype(int).clip(0)
+        last = np.ceil((np.array(grown.bounds[2:]) - origin) / _CELL).astype(int).clip(0)
+        near = np.s_[first[1] : last[1] + 1, first[0] : last[0] + 1]
+        inside = shapely.contains_xy(grown, grid_x[near], grid_y[near])
+        low[near] |= inside
+        high[near] |= inside & (top > lowest - 0.35)
     free = (room_of >= 0) & _farther(~open_floor, _TO_WALL)
     return origin, free & _farther(low, _TO_OBJECT) & _farther(high, _TO_HIGH), room_of
 

@@ -89,7 +89,7 @@ class RenderScene:
     parts: tuple[ShellPart, ...]
     placed: tuple[PlacedModel, ...]
     panes: tuple[WindowPane, ...]
-    polygons: tuple[Float64[np.ndarray, "corners 2"], ...]
+    polygons: tuple[Float64[np.ndarray, "_ 2"], ...]
     """Inner floor polygons of the rooms."""
     heights: tuple[float, ...]
     """Of the rooms' ceilings."""

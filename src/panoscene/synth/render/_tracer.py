@@ -1,6 +1,5 @@
 """Light transport: paths from the camera, one light asked at every bounce."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from panoscene.synth.render._camera import home_from_camera
 from panoscene.synth.render._light_choice import LAMP, PANE, SUN, LightChoice, RoomGrid
 from panoscene.synth.render._mitsuba import Engine
 from panoscene.synth.render._outside import SKY_CELLS, sky_cells
+from panoscene.synth.render._path import Hit, Path
 from panoscene.synth.render._records import Camera
 from panoscene.synth.render._stage import Stage
 from panoscene.synth.render._surface import Surface, leave, meet, reflected, sample_reflection
@@ -20,43 +20,6 @@ _BANDS = 4
 and they get half as many paths."""
 _MOST_PASSES = 8
 """A path goes through at most so many sheets of glass or gauze."""
-
-
-@dataclass
-class Path:
-    """State of the paths between two bounces; a tree that Dr.Jit can walk."""
-
-    ray: Any
-    light: Any
-    beta: Any
-    depth: Any
-    passes: Any
-    active: Any
-    clear: Any
-    """All surfaces so far were mirrors or glass, so that what is met is seen sharply."""
-    pdf: Any
-    room: Any
-    """Where the last scattering happened, for the weight of daylight met by chance."""
-    guided: Any
-    albedo: Any
-    normal: Any
-    framed: Any
-    """A window pane came first: the view through it guides the denoiser, reflected or not."""
-    outdoors: Any
-    """Ended outside while still clear: the view out of the window is added at the end."""
-    chance: Any
-    """A plain generator for the decisions that need no even spread."""
-
-
-@dataclass
-class _Hit:
-    """Where rays meet triangles."""
-
-    t: Any
-    prim_uv: Any
-    face: Any
-    """Among the faces of solids and veils together."""
-    valid: Any
 
 
 class Tracer:
@@ -195,7 +158,7 @@ class Tracer:
         path.active &= dr.max(path.beta) > 0
         return path, sampler
 
-    def cast(self, ray: Any, coherent: Any, active: Any, clear: Any) -> tuple["_Hit", Any, Any]:
+    def cast(self, ray: Any, coherent: Any, active: Any, clear: Any) -> tuple[Hit, Any, Any]:
         """Return the nearest triangles, which rays meet a window pane before, and which pane.
 
         Only rays that are clear meet veils.
@@ -214,7 +177,7 @@ class Tracer:
         t = dr.select(pane_met, pane.t, nearer.maxt)
         face = dr.select(veiled, veil.prim_index + stage.first_veil, solid.prim_index)
         uv = dr.select(veiled, veil.prim_uv, solid.prim_uv)
-        hit = _Hit(t, uv, face, (met | veiled) & ~pane_met)
+        hit = Hit(t, uv, face, (met | veiled) & ~pane_met)
         return hit, pane_met, pane.prim_index // 2
 
     def _turn_over(self, s: Surface, where: Any) -> None:

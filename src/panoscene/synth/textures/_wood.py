@@ -79,7 +79,7 @@ def board(rng: np.random.Generator, size: int) -> Draft:
     )
 
 
-def _laid(rng, size, metres, wood, index, *, edge, across=None, gap=0.0012) -> Draft:
+def _laid(rng, size, metres, wood, index, *, edge, across=None, gap=0.0006) -> Draft:
     """Return wooden pieces: every piece (its index) has its own cut, every edge a joint."""
     tone, pores = grain(rng, size, metres, wood)
     count = int(index.max()) + 1
@@ -92,9 +92,9 @@ def _laid(rng, size, metres, wood, index, *, edge, across=None, gap=0.0012) -> D
     colour = coloured(tone, pores, light, dark)
     colour *= (1.0 + pick(rng.normal(0.0, 0.35 * spread, count), index))[..., None]
     pixel = metres / size
-    joint = 1.0 - step(edge, gap, gap + 1.2 * pixel)
+    joint = 1.0 - step(edge, gap, gap + 0.8 * pixel)
     round_over = -6e-4 * (1.0 - step(edge, 0.0, 0.004))
-    colour *= (1.0 - 0.72 * joint)[..., None]
+    colour *= (1.0 - rng.uniform(0.25, 0.65) * joint)[..., None]
     gloss = rng.uniform(0.28, 0.55)
     return Draft(
         colour,
