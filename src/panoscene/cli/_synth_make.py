@@ -105,7 +105,7 @@ def run_render(
     check_folder(output)
     folder = model_cache(cache)
     extra = write_scene_glb if glb else None
-    again = f"the same command goes on: panoscene synth render {recipe_file} {output}"
+    again = f"the same command goes on with {output}"
     try:
         with stopping_at_once(), told_in_words("rendering") as tell:
 

@@ -2,13 +2,16 @@
 
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
 
 from panoscene.synth.dataset import Recipe, open_dataset
-from panoscene.synth.production import RenderProgress, RenderTask, render_with_ray
+from panoscene.synth.production import RenderProgress, RenderTask, begin_run, render_with_ray
+from panoscene.synth.production import _ray as ray_module
 
 pytestmark = [
     # ray leaves sockets and log files of its processes to the interpreter
@@ -79,17 +82,20 @@ def test_two_nodes_share_the_homes_and_failures_are_told(
 
 
 def test_folders_that_are_not_shared_are_noticed(
-    cluster: Any, tmp_path: Path, recipe: Recipe, cache: Path
+    tmp_path: Path, recipe: Recipe, cache: Path, copy_sample: Callable[[RenderTask], None]
 ) -> None:
-    def elsewhere(task: RenderTask) -> None:
-        (task.root / "panoramas").mkdir(exist_ok=True)
-
-    done = render_with_ray(
-        tmp_path / "set", recipe, cache, address=cluster.address, render=elsewhere
-    )
-    assert done.done == 0
-    assert len(done.failed) == 4
-    assert "must share that folder" in done.failed[0][1]
+    ray: Any = ModuleType("ray")
+    ray.get = lambda reference: None
+    ray.exceptions = SimpleNamespace(RayTaskError=KeyError, RayError=LookupError)
+    tasks, _ = begin_run(tmp_path / "set", recipe, cache, limit=None, extra=None, threads=1)
+    copy_sample(tasks[0])
+    assert ray_module._result(ray, None, tasks[0]) is None
+    problem = ray_module._result(ray, None, tasks[1])
+    assert problem is not None
+    assert "home0001-0 is not in" in problem
+    assert "must share that folder" in problem
+    missing = replace(tasks[0], root=tmp_path / "elsewhere")
+    assert "expected a shared folder" in (ray_module.outcome(copy_sample, missing) or "")
 
 
 def test_a_missing_package_is_named(

@@ -37,7 +37,7 @@ def fetch_libraries(folder: Path) -> tuple[Path, ...]:
     command = shutil.which("apt-get")
     if command is None:
         hint = "no apt-get here; download sweethome3d and sweethome3d-furniture elsewhere"
-        raise AssetError(folder, f"{hint} and give their .jar, .sh3f or .deb files with --from")
+        raise AssetError(folder, f"{hint} and give their .jar, .sh3f or .deb files")
     with tempfile.TemporaryDirectory(dir=folder) as download:
         call = [command, "download", "-q", *DEBIAN_PACKAGES]
         done = subprocess.run(  # noqa: S603 - fixed command
@@ -46,7 +46,7 @@ def fetch_libraries(folder: Path) -> tuple[Path, ...]:
         packages = sorted(Path(download).glob("*.deb"))
         if done.returncode != 0 or len(packages) < len(DEBIAN_PACKAGES):
             last = (done.stderr.strip() or "no message").splitlines()[-1]
-            hint = "run 'apt-get update' or give files with --from"
+            hint = "run 'apt-get update' or give their files"
             raise AssetError(
                 folder, f"apt-get could not download {DEBIAN_PACKAGES}: {last}; {hint}"
             )
