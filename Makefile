@@ -21,7 +21,7 @@ demo: $(VENV)/.runtime-installed
 	@echo "Look around in the repaired room: open demo/report.html in a browser."
 
 test: $(VENV)/.dev-installed
-	@OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10 $(PYTEST_FLAGS)
+	@PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10 $(PYTEST_FLAGS)
 
 lint: $(VENV)/.dev-installed
 	@$(BIN)/pre-commit run --all-files

@@ -125,7 +125,7 @@ def draw_story(story: Story, folder: Path, scratch: Path) -> None:
         )
     ]
     draw_sheet(rows, scratch / "a.png")
-    shrink(scratch / "a.png", folder / "sheet.webp", 2000)
+    shrink(scratch / "a.png", folder / "sheet.webp", 1600)
     draw_animation(
         disturbed,
         scratch / "a.webp",

@@ -3,6 +3,7 @@
     panoscene bench arrange --json > benchmarks/arrange.json
     panoscene experiment arrange --json > benchmarks/experiment.json
     panoscene experiment safety --json > benchmarks/safety.json
+    panoscene bench score --json > benchmarks/score.json
     python benchmarks/tables.py
 
 With --check it writes nothing and exits 1 when a table is stale.
@@ -13,21 +14,27 @@ import re
 import sys
 from pathlib import Path
 
-from panoscene.eval import benchmark_table, experiment_table, safety_table
+from panoscene.eval import (
+    benchmark_table,
+    experiment_table,
+    safety_table,
+    score_benchmark_table,
+)
 from panoscene.scene import CATEGORIES, MEAN_SIZE
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ("README.md", "docs/arrange.md", "docs/scene.md")
+PAGES = ("README.md", "docs/arrange.md", "docs/eval.md", "docs/scene.md")
 
 
 def tables() -> dict[str, str]:
     """Return the text between the markers, by the markers' name."""
     measured = {
         name: json.loads((ROOT / "benchmarks" / f"{name}.json").read_text())
-        for name in ("arrange", "experiment", "safety")
+        for name in ("arrange", "experiment", "safety", "score")
     }
     machine = measured["arrange"]["machine"]
     rooms = measured["experiment"]
+    scoring = measured["score"]["machine"]
     return {
         "benchmark": benchmark_table(measured["arrange"])
         + f"\n\nMedians on {machine['processor']}, {machine['cores']} cores.",
@@ -37,6 +44,8 @@ def tables() -> dict[str, str]:
             {"rows": [row for row in rooms["rows"] if "without" not in row["method"]]}
         ),
         "categories": categories_table(),
+        "score": score_benchmark_table(measured["score"])
+        + f"\n\nOn {scoring['processor']}, {scoring['cores']} cores.",
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
     }
 

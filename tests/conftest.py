@@ -1,11 +1,19 @@
-"""What every test shares: one thread for each worker, quiet plots, modest property tests."""
+"""What every test shares: one thread a worker, quiet plots, modest property tests, a browser.
+
+With the environment variable PANOSCENE_MUST_RUN, such as "browser npm", tests that need these fail
+where they would be skipped.
+"""
 
 import os
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 import torch
 from hypothesis import HealthCheck, settings
+from playwright.sync_api import Browser, expect, sync_playwright
 
 # pytest-xdist runs one worker on each core
 torch.set_num_threads(1)
@@ -21,6 +29,24 @@ settings.register_profile(
 )
 settings.load_profile("panoscene")
 
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSER_FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    # the page itself without the imitated graphics card: twenty times faster here
+    "--disable-gpu-compositing",
+]
+PATIENCE = 90_000
+"""Milliseconds; busy machines draw 3D slowly without a graphics card."""
+
 
 @pytest.fixture(scope="session")
 def root() -> Path:
@@ -32,3 +58,28 @@ def root() -> Path:
 def generator() -> torch.Generator:
     """Return a seeded source of random tensors."""
     return torch.Generator().manual_seed(0)
+
+
+@pytest.fixture(scope="session")
+def missing() -> Callable[[str, str], NoReturn]:
+    """Return what skips a test for want of a tool, or fails it where that tool must be there."""
+
+    def skip_or_fail(tool: str, reason: str) -> NoReturn:
+        if tool in os.environ.get("PANOSCENE_MUST_RUN", "").split():
+            pytest.fail(f"PANOSCENE_MUST_RUN names {tool}, but the test {reason}")
+        pytest.skip(reason)
+
+    return skip_or_fail
+
+
+@pytest.fixture(scope="module")
+def browser(missing: Callable[[str, str], NoReturn]) -> Iterator[Browser]:
+    """Return a running Chromium or Chrome without a window."""
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        missing("browser", "needs Chromium or Chrome")
+    expect.set_options(timeout=PATIENCE)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=BROWSER_FLAGS)
+        yield browser
+        browser.close()

@@ -26,30 +26,7 @@ from panoscene.cli import _measure as measure_module
 from panoscene.scene import read_box_table, read_scene, scene_json_schema
 from panoscene.views import DemoResult
 
-ROOM: dict[str, Any] = {
-    "schema": "panoscene/scene",
-    "version": 1,
-    "name": "bedroom",
-    "panorama": {"width": 1024, "height": 512, "file": "photo.jpg"},
-    "layout": {"floor_polygon": [[-2, -2], [2, -2], [2, 2], [-2, 2]]},
-    "objects": [
-        {
-            "id": "bed",
-            "category": "bed",
-            "box": {"centre": [0, 1.05, 0.3], "size": [1.6, 2, 0.6], "yaw": 3.1415},
-        },
-        {
-            "id": "chair",
-            "category": "chair",
-            "box": {"centre": [0.9, 0.9, 0.5], "size": [0.5, 0.5, 0.9], "yaw": 0},
-        },
-        {
-            "id": "lamp",
-            "category": "floor_lamp",
-            "box": {"centre": [1.9, -1.8, 0.7], "size": [0.3, 0.3, 1.4], "yaw": 1.5708},
-        },
-    ],
-}
+ROOM: dict[str, Any] = json.loads(Path(__file__).with_name("bedroom.json").read_text())
 TABLE = (
     "category,x,y,z,width,depth,height,yaw_deg\n"
     "bed,0,1,0.3,1.6,2,0.6,180\n"

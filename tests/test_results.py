@@ -1,11 +1,91 @@
-"""The pages of results are what the files of scores give."""
+"""The pages of results are what the files of scores give, and those what the code gives."""
 
+import json
+import shutil
+import statistics
 from pathlib import Path
 
+import pytest
+
 from panoscene.cli import main
+from panoscene.eval import ScoreFile, read_scores
+
+FEW = ("estimates", "default", "released", "mean-box")
 
 
 def test_the_pages_of_results_are_up_to_date(root: Path) -> None:
     page, readme = str(root / "RESULTS.md"), str(root / "README.md")
     arguments = ["eval", "report", str(root / "results"), "-o", page, "--readme", readme]
     assert main([*arguments, "--check"]) == 0
+
+
+def test_the_code_still_gives_the_committed_scores(root: Path, tmp_path: Path) -> None:
+    """Three rooms stand for all: rooms and errors depend on seed and number only.
+
+    After a change that is meant to change scores, make ``results/`` again, and ``results/first``
+    with ``panoscene eval export -o runs/first --scenes 3 --methods
+    estimates,default,released,mean-box`` and ``panoscene eval score runs/first -o results/first
+    --replicates 0``.
+    """
+    export = ["eval", "export", "-o", str(tmp_path / "run"), "--scenes", "3"]
+    assert main([*export, "--methods", ",".join(FEW)]) == 0
+    score = ["eval", "score", str(tmp_path / "run"), "-o", str(tmp_path / "scores")]
+    assert main([*score, "--replicates", "0", "--workers", "1"]) == 0
+    committed = root / "results" / "first"
+    assert {path.stem for path in committed.glob("*.json")} == set(FEW)
+    for name in FEW:
+        found = flat(read_scores(tmp_path / "scores" / f"{name}.json"))
+        expected = flat(read_scores(committed / f"{name}.json"))
+        assert found.keys() == expected.keys(), name
+        differ = {
+            key: (found[key], value)
+            for key, value in expected.items()
+            if not agree(found[key], value)
+        }
+        assert not differ, (name, differ)
+
+
+def test_the_committed_scores_are_of_the_same_rooms(root: Path) -> None:
+    files = [read_scores(path) for path in (root / "results").glob("*.json")]
+    assert len({score.targets_hash for score in files}) == 1
+    assert {score.scenes for score in files} == {200}
+    assert {score.replicates for score in files} == {1000}
+    assert {score.fov_deg for score in files} == {360, 180, 120, 90, 60, 30}
+    assert all(score.missing == 0 for score in files)
+
+
+def test_a_results_file_is_noticed_when_a_page_is_stale(root: Path, tmp_path: Path) -> None:
+    shutil.copytree(root / "results", tmp_path / "results")
+    page, readme = tmp_path / "RESULTS.md", tmp_path / "README.md"
+    page.write_text((root / "RESULTS.md").read_text())
+    readme.write_text((root / "README.md").read_text())
+    arguments = ["eval", "report", str(tmp_path / "results"), "-o", str(page)]
+    arguments += ["--readme", str(readme), "--check"]
+    assert main(arguments) == 0
+    changed = json.loads((tmp_path / "results" / "default.json").read_text())
+    changed["metrics"]["detection.ap_15_mean_57"]["value"] += 0.01
+    (tmp_path / "results" / "default.json").write_text(json.dumps(changed))
+    assert main(arguments) == 2
+
+
+def test_scoring_500_scenes_takes_less_than_a_minute(root: Path) -> None:
+    measured = json.loads((root / "benchmarks" / "score.json").read_text())
+    assert (measured["scenes"], measured["objects"], measured["workers"]) == (500, 20, 2)
+    assert len(measured["seconds"]) >= 3
+    assert measured["score_500_scenes_s"] == statistics.median(measured["seconds"]) < 60
+    assert measured["machine"]["cores"] == 2
+
+
+def agree(found: float | None, expected: float | None) -> bool:
+    """Return whether two numbers are the same but for rounding on another machine."""
+    if found is None or expected is None:
+        return found is expected
+    return found == pytest.approx(expected, rel=0.01, abs=0.002)
+
+
+def flat(score: ScoreFile) -> dict[str, float | None]:
+    """Return every number of a file of scores by name."""
+    numbers = {name: measured.value for name, measured in score.metrics.items()}
+    for category, row in score.categories.items():
+        numbers |= {f"{category}.{key}": measured.value for key, measured in row.items()}
+    return numbers

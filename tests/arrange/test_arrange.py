@@ -310,6 +310,15 @@ def test_a_diverged_run_does_not_claim_to_be_solved():
     assert arrange(noisy, "paper").certificate.outcome == "worse than the input"
 
 
+def test_a_descent_that_ends_too_early_is_not_called_solved():
+    _, noisy = noisy_room(2)
+    for steps, outcome in ((2, "improved, not converged"), (100, "solved")):
+        settings = PRESETS["default"].model_copy(update={"steps": steps})
+        certificate = arrange(noisy, settings).certificate
+        assert certificate.outcome == outcome
+        assert certificate.converged == (outcome == "solved")
+
+
 def test_mixed_precision_comes_back_as_it_went_in():
     double = dataclasses.replace(
         PAIR,

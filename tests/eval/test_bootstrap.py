@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from panoscene.eval._bootstrap import (
+    bias_corrected_intervals,
     bootstrap_interval,
     bootstrap_ratio,
     bootstrap_weights,
@@ -105,3 +106,28 @@ def test_bad_arguments_are_refused() -> None:
     for confidence in (0.0, 1.0, 95.0):
         with pytest.raises(ValueError, match=r"confidence must be in \(0, 1\)"):
             bootstrap_interval(np.zeros(2), weights=weights, confidence=confidence)
+
+
+def test_without_bias_the_correction_changes_nothing() -> None:
+    values = np.arange(101.0)[:, None]
+    for estimate in (50.0, math.nan):
+        (plain,) = percentile_intervals(np.array([estimate]), values)
+        (corrected,) = bias_corrected_intervals(np.array([estimate]), values)
+        assert corrected.low == pytest.approx(plain.low)
+        assert corrected.high == pytest.approx(plain.high)
+    # ties count by half: a metric that never changes has no bias
+    (same,) = bias_corrected_intervals(np.array([2.0]), np.full((10, 1), 2.0))
+    assert (same.low, same.high) == (2.0, 2.0)
+
+
+def test_the_correction_moves_against_the_bias() -> None:
+    rng = np.random.default_rng(0)
+    replicates = rng.normal(1.0, 1.0, (4000, 1))  # one standard deviation above the estimate 0
+    (interval,) = bias_corrected_intervals(np.array([0.0]), replicates)
+    assert interval.low == pytest.approx(-1.0 - 1.96, abs=0.35)
+    assert interval.high == pytest.approx(-1.0 + 1.96, abs=0.15)
+    # all replicates on one side: still an interval of them
+    (beyond,) = bias_corrected_intervals(np.array([-9.0]), replicates)
+    assert replicates.min() <= beyond.low <= beyond.high <= replicates.max()
+    with pytest.raises(ValueError, match="confidence"):
+        bias_corrected_intervals(np.array([0.0]), replicates, confidence=1.0)

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from panoscene.eval._average_precision import average_precision, released_average_precision
+from panoscene.eval._detection import DetectionScores
+from panoscene.eval._fov import FOV_DEG
+from panoscene.eval._pooling import detection_values
 from panoscene.eval._published import (
     PAPER_ABLATION,
     PAPER_AP_COMMON,
     PAPER_AP_FULL,
     PAPER_COLLISIONS,
-    PAPER_FOV_DEG,
     PAPER_FOV_MAP_57,
     PAPER_MAP_57,
     PAPER_MAP_COMMON,
@@ -41,6 +43,26 @@ def test_the_mean_over_57_is_one_over_42() -> None:
     assert sum(PAPER_AP_FULL.values()) / 57 == pytest.approx(24.75, abs=0.005)
 
 
+def test_our_released_mean_gives_the_published_one() -> None:
+    printed = np.array([PAPER_AP_FULL.get(name, np.nan) for name in CATEGORIES]) / 100
+    counts = np.isfinite(printed).astype(np.float64)
+    scores = DetectionScores(
+        iou_thresholds=(0.15,),
+        score_threshold=0.0,
+        average_precision=np.full((1, len(CATEGORIES)), np.nan),
+        released_average_precision=printed[None],
+        targets=counts,
+        detections=counts,
+        kept=counts,
+        hits=np.zeros((1, len(CATEGORIES))),
+    )
+    assert scores.mean_released_average_precision() == pytest.approx([0.3359], abs=5e-5)
+    common = scores.mean_released_average_precision(COMMON_11)
+    assert common == pytest.approx([PAPER_MAP_COMMON["Ours Full"] / 100], abs=5.1e-5)
+    named = detection_values(scores)
+    assert float(named["released_ap_15_mean_57"]) == pytest.approx(0.3359, abs=5e-5)
+
+
 def test_standard_areas_differ_whenever_targets_are_missed() -> None:
     hit = np.array([True, True, False, True])
     score = np.array([0.9, 0.8, 0.7, 0.6])
@@ -60,7 +82,7 @@ def test_tables_agree_where_they_repeat_each_other() -> None:
     assert PAPER_FOV_MAP_57["Ours w/o RO"][0] == without.map_57
     # known inconsistency of the paper
     assert PAPER_FOV_MAP_57["Ours Full"][0] == 33.92 != full.map_57
-    assert all(len(row) == len(PAPER_FOV_DEG) for row in PAPER_FOV_MAP_57.values())
+    assert all(len(row) == len(FOV_DEG) for row in PAPER_FOV_MAP_57.values())
     assert set(PAPER_COLLISIONS) == set(PAPER_MAP_57) == set(PAPER_METHODS)
 
 

@@ -1,25 +1,33 @@
 """Predictions to disk, scores from disk, pages from scores."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from panoscene.cli import main
 from panoscene.eval import (
     METHODS,
+    Inputs,
     Measured,
+    Method,
     export_predictions,
+    read_manifest,
     read_scores,
+    relation_record,
     results_page,
     run_score_benchmark,
     sample_targets,
     score_benchmark_table,
     score_folder,
+    score_relations,
     summary_table,
     write_scores,
 )
-from panoscene.scene import SceneFormatError, read_scene
+from panoscene.scene import Scene, SceneFormatError, Shapes, box_mesh, read_scene
+from panoscene.synth import sample_room
 
 CHOSEN = ("estimates", "default", "mean-box", "truth", "default-180")
 
@@ -37,6 +45,8 @@ def test_an_export_holds_targets_predictions_and_how_they_were_made(export: Path
     facts = json.loads((export / "export.json").read_text())
     assert facts["scenes"] == 3
     assert set(facts["methods"]) == set(CHOSEN)
+    assert facts["methods"]["default-180"]["fov_deg"] == 180
+    assert facts["methods"]["default"]["fov_deg"] == 360
     for name in CHOSEN:
         for target in (export / "targets").glob("*.json"):
             prediction = read_scene(export / "predictions" / name / target.name)
@@ -124,6 +134,7 @@ def test_the_commands_write_results_and_notice_stale_pages(
     assert main([*report, "--check"]) == 0
     assert "three rooms" in page.read_text()
     assert readme.read_text().startswith("before\n<!-- results:begin -->\n| method |")
+    assert read_scores(results / "default-180.json").fov_deg == 180
     assert "`default-180`" not in summary_table([read_scores(p) for p in results.glob("*.json")])
     readme.write_text(readme.read_text().replace("`truth`", "`lies`"))
     capsys.readouterr()
@@ -144,9 +155,68 @@ def test_files_of_scores_come_back_and_bad_ones_are_named(export: Path, tmp_path
     score = score_folder(export / "predictions" / "truth", export / "targets", replicates=0)
     write_scores(score, tmp_path / "a.json")
     assert read_scores(tmp_path / "a.json") == score
+    lines = (tmp_path / "a.json").read_text().splitlines()
+    assert len(lines) < len(score.metrics) + len(score.categories) + 30
+    assert json.loads("\n".join(lines))["metrics"].keys() == score.metrics.keys()
     (tmp_path / "b.json").write_text('{"schema": "panoscene/score", "version": 2}')
     with pytest.raises(SceneFormatError, match=r"b\.json"):
         read_scores(tmp_path / "b.json")
+
+
+def test_scores_without_a_field_of_view_are_of_whole_rooms(export: Path, tmp_path: Path) -> None:
+    score = score_folder(export / "predictions" / "truth", export / "targets", replicates=0)
+    write_scores(score, tmp_path / "a.json")
+    old = json.loads((tmp_path / "a.json").read_text())
+    del old["fov_deg"]
+    (tmp_path / "a.json").write_text(json.dumps(old))
+    assert read_scores(tmp_path / "a.json").fov_deg == 360
+
+
+def test_weak_relations_come_with_the_same_boxes(tmp_path: Path) -> None:
+    taken: list[Inputs] = []
+
+    def take(inputs: Inputs) -> list[Scene]:
+        taken.append(inputs)
+        return list(inputs.estimates)
+
+    methods = {"spy": Method("input", "keeps what it gets", take)}
+    targets = sample_targets(4, 5)
+    export_predictions(tmp_path, targets, seed=5, methods=methods)
+    ((estimates, weak),) = [(t.estimates, t.with_weak_relations) for t in taken]
+    for one, other in zip(estimates, weak, strict=True):
+        assert one.objects.boxes.centre.equal(other.objects.boxes.centre)
+        assert one.objects.category.equal(other.objects.category)
+        assert one.layout.floor_polygon.equal(other.layout.floor_polygon)
+    good, bad = (
+        score_relations([relation_record(*pair) for pair in zip(scenes, targets, strict=True)])
+        for scenes in (estimates, weak)
+    )
+    assert (good["touching_f1"] or 0) > 0.75
+    assert (bad["touching_f1"] or 1) < 0.65
+
+
+def test_a_damaged_manifest_is_named(export: Path, tmp_path: Path) -> None:
+    (tmp_path / "export.json").write_text('{"methods": {"a": {}}}')
+    with pytest.raises(SceneFormatError, match=r"export\.json"):
+        read_manifest(tmp_path / "export.json")
+    assert main(["eval", "score", str(tmp_path)]) == 2
+    _, methods = read_manifest(export / "export.json")
+    assert methods["truth"].kind == "oracle"
+
+
+def test_meshes_of_the_targets_become_tables(tmp_path: Path) -> None:
+    room = replace(sample_room(np.random.default_rng(2), objects=4), name="room")
+    meshes = Shapes(mesh=(box_mesh(),) * len(room.objects.boxes))
+    room = replace(room, objects=replace(room.objects, shapes=meshes))
+    methods = {name: METHODS[name] for name in ("mean-box", "truth")}
+    export_predictions(tmp_path, [room], methods=methods)
+    arguments = ["eval", "score", str(tmp_path), "-o", str(tmp_path / "scores"), "--shapes"]
+    assert main([*arguments, "--replicates", "0", "--workers", "1"]) == 0
+    page = results_page([read_scores(path) for path in (tmp_path / "scores").glob("*.json")])
+    shapes = page.split("\n## Shapes\n")[1]
+    assert f"| `truth` | oracle | {len(room.objects.boxes)} |" in shapes
+    assert "| `mean-box` | baseline |" in page.split("\n## Mesh penetration\n")[1]
+    assert "What is not here" not in page
 
 
 def test_cells_say_when_there_is_no_number() -> None:
@@ -173,7 +243,7 @@ def test_bad_requests_end_with_one_message(
 
 
 def test_the_benchmark_scores_as_many_rooms_as_it_says() -> None:
-    result = run_score_benchmark(repeats=2, scenes=3, objects=4, workers=1)
+    result = run_score_benchmark(repeats=2, scenes=3, objects=4, workers=1, replicates=2)
     seconds = result["seconds"]
     assert isinstance(seconds, list)
     assert len(seconds) == 2

@@ -191,6 +191,19 @@ def test_rooms_of_any_shape_and_size(room: Scene, empty: Scene, tmp_path: Path) 
         assert max(map(float, root.attrib["viewBox"].split())) < 420
 
 
+@pytest.mark.parametrize(("wide", "lengths"), [(0.5, 1), (0.3, 1), (3.0, 2)])
+def test_a_narrow_nook_has_one_dimension_of_its_depth(
+    empty: Scene, wide: float, lengths: int
+) -> None:
+    nook = [[0.0, 0], [2, 0], [2, 0.6], [2 + wide, 0.6], [2 + wide, 0], [6, 0], [6, 4], [0, 4]]
+    layout = Layout(torch.tensor(nook))
+    plan = floor_plan(replace(empty, layout=layout, relations=None))
+    depths = [d for d in plan.dimensions if d.text == "0.60"]
+    assert len(depths) == lengths
+    for one in depths:  # beside its wall, in the nook
+        assert 2.1 < one.line[0, 0] < 2 + wide - 0.1
+
+
 def test_bad_scenes_leave_nothing(room: Scene, tmp_path: Path) -> None:
     boxes = replace(room.objects.boxes, size=torch.full((4, 3), torch.nan))
     bad = replace(room, objects=replace(room.objects, boxes=boxes))

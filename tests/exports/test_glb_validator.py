@@ -3,7 +3,9 @@
 import json
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 import torch
@@ -15,10 +17,10 @@ HERE = Path(__file__).parent / "validator"
 
 
 @pytest.fixture(scope="module")
-def validator(root: Path) -> Path:
+def validator(root: Path, missing: Callable[[str, str], NoReturn]) -> Path:
     """Return the folder of node modules; it is filled once."""
     if shutil.which("node") is None or shutil.which("npm") is None:
-        pytest.skip("needs node and npm for the glTF validator")
+        missing("npm", "needs node and npm for the glTF validator")
     folder = root / ".cache" / "gltf-validator"
     lock = (HERE / "package-lock.json").read_text()
     kept = folder / "package-lock.json"
@@ -31,7 +33,7 @@ def validator(root: Path) -> Path:
             subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=60)
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             shutil.rmtree(folder)
-            pytest.skip(f"npm could not fetch the glTF validator: {error}")
+            missing("npm", f"needs the glTF validator, which npm could not fetch: {error}")
     return folder / "node_modules"
 
 

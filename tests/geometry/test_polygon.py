@@ -23,6 +23,7 @@ from panoscene.geometry._polygon_validity import (
     polygon_intersection_area,
     polygon_iou,
     polygon_problem,
+    polygon_turn,
 )
 
 SQUARE = torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]], dtype=torch.float64)
@@ -192,6 +193,25 @@ def test_manhattan_rooms_may_be_turned(angle: float) -> None:
     assert is_manhattan(L_ROOM @ turn)
     assert is_manhattan(padded(L_ROOM) @ turn)
     assert not is_manhattan(COMB @ turn)
+
+
+@given(st.floats(-4, 4))
+def test_the_turn_of_a_polygon_lays_its_walls_along_the_axes(angle: float) -> None:
+    cos, sin = math.cos(angle), math.sin(angle)
+    turned = L_ROOM @ torch.tensor([[cos, sin], [-sin, cos]], dtype=torch.float64)
+    found = polygon_turn(turned)
+    assert abs(found) <= math.pi / 4 + 1e-9
+    assert polygon_turn(padded(turned)) == pytest.approx(found, abs=1e-9)
+    # turned back, up to quarter turns
+    assert math.remainder(angle + found, math.pi / 2) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_turn_of_a_polygon_follows_most_of_the_wall() -> None:
+    # one skewed wall of four, by 0.1 rad: the others outweigh it
+    skewed = SQUARE.clone()
+    skewed[2, 0] += 2 * math.tan(0.1)
+    assert 0 < abs(polygon_turn(skewed)) < 0.05
+    assert polygon_turn(SQUARE.float()) == pytest.approx(0, abs=1e-7)
 
 
 def test_manhattan_tolerance() -> None:

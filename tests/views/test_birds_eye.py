@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 import torch
 from PIL import Image
 
@@ -13,6 +14,7 @@ from panoscene.scene import Objects, Scene
 from panoscene.style import ALARM
 from panoscene.synth import PerturbNoise, perturb_scene, sample_room
 from panoscene.views import draw_birds_eye, draw_comparison
+from panoscene.views._pieces import _wall_contact
 
 SMALL = (620, 420)
 
@@ -187,3 +189,25 @@ def test_threads_do_not_disturb_each_other(tmp_path: Path) -> None:
     for k in range(2):
         alone, threaded = tmp_path / f"alone-{k}.png", tmp_path / f"thread-{k}.png"
         assert alone.read_bytes() == threaded.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "start", "end"),
+    [
+        # in front of the wall: across it; beside and behind it: from its end to the nearest corner
+        (2.0, 2.0, (2.0, -5.0), (2.0, 8.0)),
+        (12.0, 0.0, (5.0, 0.0), (16.0, 0.0)),
+        (2.0, -3.0, None, (2.0, -6.0)),
+    ],
+)
+def test_contacts_join_the_wall_and_the_object(
+    x: float, y: float, start: tuple[float, float] | None, end: tuple[float, float]
+) -> None:
+    wall = np.array([[0.0, 0.0], [10.0, 0.0]])
+    box = shapely.box(x - 1, y - 1, x + 1, y + 1)
+    contact = _wall_contact(box, wall[0], wall[1], np.array([0.0, 1.0]))
+    if start is not None:
+        assert contact.start[1] == pytest.approx(start[1], abs=3)
+        assert contact.start[0] == pytest.approx(start[0], abs=1)
+    assert shapely.LineString([contact.start, contact.end]).intersects(box)
+    assert contact.end[1] == pytest.approx(end[1], abs=4)

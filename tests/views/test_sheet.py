@@ -1,14 +1,17 @@
 """Sheets have a row for each scene, only columns with content, and one photo for a room."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 import torch
 from PIL import Image
 
+from panoscene.style import BODY
 from panoscene.synth import perturb_scene, sample_room
-from panoscene.views._sheet import draw_sheet
+from panoscene.views._sheet import SMALLEST, draw_sheet
 from panoscene.views._sheet_grid import SheetRow, make_grid
 
 TRUTH = sample_room(np.random.default_rng(0), objects=5, corners=6)
@@ -38,54 +41,66 @@ def test_methods_stand_below_each_other(tmp_path: Path) -> None:
     picture = pixels(file)
     grid = make_grid(rows, "Sheet", 1000)
     assert picture.shape == (grid.height, 1000, 3)
-    assert list(grid.columns) == ["input", "room", "overlay", "rendering"]
+    assert list(grid.cells) == ["input", "room", "overlay", "rendering"]
     left, top, right, _ = where(picture, (0, 255, 0))
-    column, width = grid.columns["rendering"]
-    assert abs(left - column) <= 1
-    assert abs(right - left - width) <= 2
-    assert abs(top - grid.tops[0]) <= 1
-    # the photo stands beside both rows, and behind both overlays
-    shown = np.nonzero((picture[:, : sum(grid.columns["input"])] == (255, 0, 0)).all(-1))[0]
-    assert grid.tops[0] < shown.min() < grid.tops[1] < shown.max()
-    start, width = grid.columns["overlay"]
-    overlays = (picture[:, start : start + width] == (255, 0, 0)).all(-1).any(1)
-    assert overlays[grid.tops[0] + 5]
-    assert overlays[grid.tops[1] + 5]
+    cell = grid.cells["rendering"]
+    assert abs(left - cell.left) <= 1
+    assert abs(right - left - cell.width) <= 2
+    assert abs(top - grid.tops[0] - cell.down) <= 1
+    # the photo stands in both rows, and behind both overlays
+    for column in ("input", "overlay"):
+        cell = grid.cells[column]
+        for start in grid.tops:
+            shown = picture[start + cell.down + 3, cell.left + 3 : cell.left + cell.width - 3]
+            assert (shown == (255, 0, 0)).all(-1).mean() > 0.9
     assert [path.name for path in tmp_path.iterdir()] == ["sheet.png"]
 
 
 def test_columns_without_content_are_left_out() -> None:
     grid = make_grid([SheetRow("Truth", TRUTH)], "", 1200)
-    assert list(grid.columns) == ["room", "overlay"]
+    assert list(grid.cells) == ["room", "overlay"]
     view = torch.zeros(3, 30, 40)
     grid = make_grid([SheetRow("Input", image=RED), SheetRow("Ours", view=view)], "", 1200)
-    assert list(grid.columns) == ["input", "view"]
+    assert list(grid.cells) == ["input", "view"]
 
 
-def test_cells_lie_beside_and_below_each_other() -> None:
+def test_cells_are_large_and_apart() -> None:
     rows = [
         SheetRow(f"Row {k}", TRUTH, image=RED, rendering=GREEN, view=GREEN, room=f"Room {k // 2}")
         for k in range(6)
     ]
     grid = make_grid(rows, "Title", 2000)
-    ends = [left + width for left, width in grid.columns.values()]
-    starts = [left for left, _ in grid.columns.values()]
-    assert all(end < start for end, start in zip(ends[:-1], starts[1:], strict=True))
-    assert ends[-1] <= 2000
+    shapes = [
+        shapely.box(
+            cell.left, top + cell.down, cell.left + cell.width, top + cell.down + cell.height
+        )
+        for top in grid.tops
+        for cell in grid.cells.values()
+    ]
+    assert all(a.disjoint(b) for a, b in itertools.combinations(shapes, 2))
+    assert shapely.box(0, 0, 2000, grid.height).contains(shapely.union_all(shapes))
+    # shown 900 pixels wide, each is still a picture to look at
+    assert min(cell.height for cell in grid.cells.values()) * 900 / 2000 >= 170
     gaps = np.diff(grid.tops)
-    assert (gaps > grid.cell_height).all()
     assert (gaps[1::2] > gaps[0]).all(), "a new room needs its heading"
-    assert grid.tops[-1] + grid.cell_height < grid.height
+
+
+def test_type_is_legible_where_sheets_are_shown() -> None:
+    pixels_at_900 = SMALLEST * BODY * make_grid([SheetRow("Truth", TRUTH)], "", 2000).unit * 0.45
+    assert 0.75 * pixels_at_900 >= 9.0, "points, at 96 pixels per inch"
 
 
 def test_a_row_of_its_own_keeps_its_photo(tmp_path: Path) -> None:
     rows = [SheetRow("Input", image=RED), SheetRow("Truth", TRUTH), SheetRow("Again", TRUTH)]
     draw_sheet(rows, tmp_path / "sheet.png", width_px=900)
     grid = make_grid(rows, "", 900)
-    picture = pixels(tmp_path / "sheet.png")[:, : sum(grid.columns["input"])]
+    picture = pixels(tmp_path / "sheet.png")[: grid.tops[1]]
+    cell = grid.cells["input"]
     _, top, _, bottom = where(picture, (255, 0, 0))
-    assert abs(top - grid.tops[0]) <= 1
-    assert bottom <= grid.tops[1]
+    assert abs(top - grid.tops[0] - cell.down) <= 1
+    assert abs(bottom - top - cell.height) <= 2
+    # its place stays empty in no other row
+    assert grid.cells["room"].left == cell.left
 
 
 @pytest.mark.parametrize(

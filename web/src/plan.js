@@ -109,7 +109,7 @@ export class PlanView {
 
   makeDimensions(polygon) {
     const normals = wallNormals(polygon);
-    const taken = [];
+    const taken = [], floor = polygon.map(this.page);
     return polygon.flatMap((start, k) => {
       const end = polygon[(k + 1) % polygon.length];
       const length = Math.hypot(end[0] - start[0], end[1] - start[1]);
@@ -118,12 +118,16 @@ export class PlanView {
       const [x, y] = this.page(middle), [a, b] = [this.page(start), this.page(end)];
       const box = [x - DIMENSION, y - DIMENSION, x + DIMENSION, y + DIMENSION];
       const isShort = length < SHORTEST_DIMENSION || length * this.scale < 2 * DIMENSION;
-      if (isShort || taken.some((other) => overlap(box, other))) return [];
+      const text = `${length.toFixed(2)} m`;
+      // in a nook too narrow for it the text would lie on the walls, dark on dark
+      const half = (0.5 * LETTER * text.length + MOST_WALL) / Math.hypot(b[0] - a[0], b[1] - a[1]);
+      const ends = [-half, half].map((share) => [x + share * (b[0] - a[0]), y + share * (b[1] - a[1])]);
+      const isHidden = ends.some((end) => isInside(end, floor));
+      if (isShort || isHidden || taken.some((other) => overlap(box, other))) return [];
       taken.push(box);
       const angle = (Math.atan2(b[1] - a[1], b[0] - a[0]) * 180) / Math.PI;
       const upright = angle > 89 ? angle - 180 : angle <= -91 ? angle + 180 : angle;
       const transform = `translate(${x.toFixed(1)} ${y.toFixed(1)}) rotate(${upright.toFixed(2)})`;
-      const text = `${length.toFixed(2)} m`;
       return [makeSvg("text", { class: "dimension", transform, dy: "0.35em" }, text)];
     });
   }
@@ -290,6 +294,13 @@ export class PlanView {
     return this.view.setAttribute("d", pathOf([this.page([0, 0]), ...arc]));
   }
 }
+
+/** Whether a point lies in a polygon: walls to its right are passed an odd number of times. */
+const isInside = ([x, y], polygon) =>
+  polygon.filter(([ax, ay], k) => {
+    const [bx, by] = polygon[(k + 1) % polygon.length];
+    return ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax);
+  }).length % 2 === 1;
 
 const topOf = ({ centre, size }) => centre[2] + size[2] / 2;
 

@@ -84,22 +84,25 @@ def arrange_scenes(
         finite = torch.isfinite(final).all(0).all(-1)
         final = torch.where(finite[None, :, None], final, problem.start)
         solved = _settle(final, problem) if settings.safe else final
-        before, between, after = _measure_all([kept[late], solved], problem)
+        before, after = _measure_all([solved], problem)
+        start, between, end = before.energy.sum(-1), *_energies([kept[late], final], problem)
         chosen = _choose(problem, _Solved(final, solved, finite, after), kept, before)
         path = [boxes_from_variables(kept[mark], problem) for mark in sorted(marks)]
-    energies = torch.stack([m.energy.sum(-1) for m in (before, between, after)])
+    energies = torch.stack([start, between, end])
     outside = ((batch.inside_room < 0.5) & batch.valid).sum(-1)
     results = []
     for index, scene in enumerate(scenes):
+        converged = _converged(*energies[:, index].tolist())
         count = len(scene.objects.boxes)
         boxes = chosen.boxes[index, :count] if chosen.changed[index] else scene.objects.boxes
         certificate = Certificate(
             preset=settings.name,
             steps=settings.steps,
             changed=bool(chosen.changed[index]),
-            converged=_converged(*energies[:, index].tolist()),
+            converged=converged,
             outcome=_words(
                 chosen.outcome[index],
+                converged,
                 float(before.energy[index].sum()),
                 float(chosen.after.energy[index].sum()),
             ),
@@ -228,6 +231,12 @@ def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
     return measure(boxes, together.batch, energies).split(1 + len(states))
 
 
+def _energies(states: list[Tensor], problem: Problem) -> tuple[Tensor, ...]:
+    """Return the energy of each scene in each state."""
+    together = repeat_problem(problem, len(states))
+    return energy_terms(torch.cat(states, 1), together).sum(-1).chunk(len(states))
+
+
 @dataclass(frozen=True, slots=True)
 class _Solved:
     """Where the descent ended: as it did, settled on the floor, and measured."""
@@ -298,10 +307,16 @@ def _acceptable(after: Measures, before: Measures) -> Tensor:
     return (new <= old + _SLACK * (1 + old.abs())).all(-1) & torch.isfinite(new).all(-1)
 
 
-def _words(outcome: str, start: float, end: float) -> str:
-    """Return the outcome, or that it is worse than the input, which only ``safe`` forbids."""
-    worse = outcome == "solved" and end > start + _SLACK * (1 + abs(start))
-    return "worse than the input" if worse else outcome
+def _words(outcome: str, converged: bool, start: float, end: float) -> str:
+    """Return the outcome; a descent that ended too early, or uphill, does not count as solved.
+
+    Only ``safe`` forbids a result that is worse than the input.
+    """
+    if outcome != "solved":
+        return outcome
+    if end > start + _SLACK * (1 + abs(start)):
+        return "worse than the input"
+    return outcome if converged else "improved, not converged"
 
 
 def _size_change(before: OrientedBoxes, after: OrientedBoxes) -> float:

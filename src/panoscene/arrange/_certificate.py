@@ -56,7 +56,8 @@ class Certificate:
     converged: bool
     """The last quarter of the steps brought less than 1 % of the energy's decrease."""
     outcome: str
-    """In words: why the result is what it is."""
+    """In words: why the result is what it is. "solved" is the end of a descent that had converged;
+    "improved, not converged" the end of one that had not, so that more steps may help."""
     largest_size_change: float
     """Largest factor, at least 1, by which an extent of any box grew or shrank."""
     left_outside: int

@@ -34,10 +34,10 @@ def _tell(result: DemoResult) -> None:
                 "d",
             ),
             (
-                "worst penetration, m",
-                result.worst_penetration_before,
-                result.worst_penetration_after,
-                ".3f",
+                "worst penetration, cm",
+                100 * result.worst_penetration_before,
+                100 * result.worst_penetration_after,
+                ".1f",
             ),
             (
                 "volume out of the room, m³",

@@ -9,11 +9,11 @@ from torch import Tensor
 
 from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import blaming, check_folder, relocated, write_bytes, writing
+from panoscene.cli._files import blaming, check_folder, write_bytes, writing
 from panoscene.cli._photos import photo_image
 from panoscene.cli._progress import progress_words
 from panoscene.cli._terminal import note
-from panoscene.scene import Scene, read_scene
+from panoscene.scene import Scene, read_scene, relocate_photo
 from panoscene.views import (
     SheetRow,
     default_view,
@@ -94,7 +94,7 @@ def serve_file(
     image = photo_image(scene, file, photo)
     if save_to is not None:
         with writing(save_to):
-            scene = relocated(scene, file, save_to)
+            scene = relocate_photo(scene, file, save_to)
     try:
         with blaming(f"view {file}"):
             viewer = serve(scene, host=host, port=port, image=image, save_to=save_to)

@@ -1,6 +1,5 @@
 """Predictions to disk, scores from disk, tables from scores."""
 
-import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -15,20 +14,23 @@ from panoscene.eval import (
     PREDICTIONS,
     SUMMARY,
     TARGETS,
+    ExportedMethod,
     ScoreFile,
     export_predictions,
+    read_manifest,
     read_scores,
     results_page,
     sample_targets,
     score_folder,
     score_table,
+    summary_note,
     summary_table,
     write_scores,
 )
 from panoscene.eval import replace_between as between
 from panoscene.scene import Scene, read_scene
 
-Job = tuple[Path, dict[str, str], Path]
+Job = tuple[Path, ExportedMethod, Path]
 """A folder of predictions, what is known of it, and the folder of its targets."""
 
 
@@ -83,8 +85,9 @@ def run_score(
                 folder,
                 truth,
                 method=folder.name,
-                kind=facts.get("kind", "prediction"),
-                description=facts.get("description", ""),
+                kind=facts.kind,
+                description=facts.description,
+                fov_deg=facts.fov_deg,
                 data=data,
                 shapes=shapes,
                 replicates=replicates,
@@ -114,7 +117,8 @@ def run_report(source: Path, output: Path, readme: Path | None, *, check: bool) 
     with blaming(source):
         texts = {output: results_page(scores)}
         if readme is not None:
-            texts[readme] = between(readme.read_text(), "results", summary_table(scores))
+            short = f"{summary_table(scores)}\n\n{summary_note(scores)}"
+            texts[readme] = between(readme.read_text(), "results", short)
     stale = [path for path, text in texts.items() if not path.exists() or path.read_text() != text]
     if check:
         if stale:
@@ -130,22 +134,19 @@ def run_report(source: Path, output: Path, readme: Path | None, *, check: bool) 
     return 0
 
 
-def _jobs(
-    source: Path, targets: Path | None
-) -> tuple[list[tuple[Path, dict[str, str], Path]], str]:
+def _jobs(source: Path, targets: Path | None) -> tuple[list[Job], str]:
     """Return each folder of predictions with what is known of it, and its targets."""
     manifest = source / MANIFEST
     if targets is not None or not manifest.exists():
         if targets is None:
             expected = "--targets FOLDER with the true scenes, or a folder made by eval export"
             raise InputError(f"{source}: found predictions alone, expected {expected}")
-        return [(source, {}, targets)], str(targets)
-    facts = json.loads(manifest.read_text())
+        return [(source, ExportedMethod("prediction", ""), targets)], str(targets)
+    data, methods = read_manifest(manifest)
     jobs = [
-        (source / PREDICTIONS / name, known, source / TARGETS)
-        for name, known in facts["methods"].items()
+        (source / PREDICTIONS / name, known, source / TARGETS) for name, known in methods.items()
     ]
-    return jobs, facts["data"]
+    return jobs, data
 
 
 def _named(files: list[Path]) -> list[Scene]:

@@ -59,7 +59,7 @@ def score(
     targets: OptionalFolder = None,
     output: OptionalOutput = None,
     shapes: Flag = False,
-    replicates: Count = 200,
+    replicates: Count = 1000,
     workers: OptionalCount = None,
     json: Flag = False,
 ) -> int:

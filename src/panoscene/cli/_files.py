@@ -4,7 +4,6 @@ import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
@@ -12,6 +11,7 @@ from panoscene.scene import (
     PanoramaError,
     Scene,
     SceneFormatError,
+    relocate_photo,
     write_atomically,
     write_scene,
 )
@@ -65,19 +65,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 def write_scene_from(source: Path, scene: Scene, target: Path) -> None:
     """Write a scene that was read from another file; the photo is still found from there."""
     with writing(target):
-        write_scene(relocated(scene, source, target), target)
-
-
-def relocated(scene: Scene, source: Path, target: Path) -> Scene:
-    """Return a scene read from one file so that its photo is found from another one."""
-    photo = scene.panorama.file
-    if photo is not None and not Path(photo).is_absolute():
-        try:
-            photo = Path(os.path.relpath(source.parent / photo, target.parent)).as_posix()
-        except ValueError:  # another drive
-            photo = (source.parent / photo).resolve().as_posix()
-        scene = replace(scene, panorama=replace(scene.panorama, file=photo))
-    return scene
+        write_scene(relocate_photo(scene, source, target), target)
 
 
 def scene_files(arguments: Sequence[str]) -> list[Path]:

@@ -5,10 +5,10 @@ from pathlib import Path
 from jaxtyping import Float
 from torch import Tensor
 
-from panoscene.cli._files import blaming, relocated, writing
+from panoscene.cli._files import blaming, writing
 from panoscene.cli._kinds import Kind
 from panoscene.cli._photos import photo_image
-from panoscene.scene import Scene
+from panoscene.scene import Scene, relocate_photo
 
 MODELS: tuple[Kind, ...] = ("GLB", "OBJ", "SVG", "DXF", "page")
 """What other programs open."""
@@ -38,7 +38,7 @@ def write_model(kind: Kind, scene: Scene, output: Path, source: Path, photo: Pat
     image = photo_image(scene, source, photo) if kind in WITH_PHOTO else None
     with blaming(source), writing(output):
         if kind == "GLB":
-            exports.write_glb(relocated(scene, source, output), output, image=image)
+            exports.write_glb(relocate_photo(scene, source, output), output, image=image)
         elif kind == "OBJ":
             exports.write_obj(scene, output)
         elif kind == "SVG":

@@ -2,17 +2,12 @@
 
 from pathlib import Path
 
-import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.cli._errors import InputError
 from panoscene.cli._terminal import note
-from panoscene.geometry import rotate_panorama
-from panoscene.scene import Panorama, Scene, read_panorama
-
-MOST_TURNED = 4096
-"""Columns that are kept of a photo that has to be turned: more than any view or texture shows."""
+from panoscene.scene import Scene, read_panorama, upright_photo
 
 
 def photo_image(
@@ -33,23 +28,7 @@ def photo_image(
         PanoramaError: It is not a panorama.
     """
     path = _photo_path(scene, file, photo)
-    return None if path is None else upright(read_panorama(path)[0], scene.panorama)
-
-
-def upright(image: Float[Tensor, "3 height width"], panorama: Panorama) -> Float[Tensor, "3 _ _"]:
-    """Return a photo as a camera that stands upright would have taken it.
-
-    A photo that is upright already comes back as it is; another one has at most 4096 columns.
-    """
-    rotation = torch.tensor(panorama.upright_from_photo, dtype=torch.float64)
-    if torch.equal(rotation, torch.eye(3, dtype=torch.float64)):
-        return image
-    if image.shape[-1] > MOST_TURNED:
-        size = (MOST_TURNED // 2, MOST_TURNED)
-        image = torch.nn.functional.interpolate(image[None], size=size, mode="area")[0]
-    # files carry rounded numbers: the nearest rotation has none of their errors
-    left, _, right = torch.linalg.svd(rotation)
-    return rotate_panorama(image, left @ right)
+    return None if path is None else upright_photo(read_panorama(path)[0], scene.panorama)
 
 
 def _photo_path(scene: Scene, file: Path, photo: Path | None) -> Path | None:

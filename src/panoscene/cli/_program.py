@@ -1,6 +1,7 @@
 """The program: which commands there are, and how a run of one ends."""
 
 import io
+import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -102,6 +103,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # a terminal that cannot show a character must not end the program
         sys.stdout.reconfigure(errors="backslashreplace")
+    # remarks at its first use, about fonts and caches, mean nothing to who wants a picture
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         try:
             return _run(arguments)

@@ -12,6 +12,7 @@ from panoscene.eval._average_precision import (
     released_average_precision as released_average_precision,
 )
 from panoscene.eval._bootstrap import Interval as Interval
+from panoscene.eval._bootstrap import bias_corrected_intervals as bias_corrected_intervals
 from panoscene.eval._bootstrap import bootstrap_interval as bootstrap_interval
 from panoscene.eval._bootstrap import bootstrap_ratio as bootstrap_ratio
 from panoscene.eval._bootstrap import bootstrap_weights as bootstrap_weights
@@ -29,7 +30,9 @@ from panoscene.eval._export import PREDICTIONS as PREDICTIONS
 from panoscene.eval._export import TARGETS as TARGETS
 from panoscene.eval._export import ExportedMethod as ExportedMethod
 from panoscene.eval._export import export_predictions as export_predictions
+from panoscene.eval._export import read_manifest as read_manifest
 from panoscene.eval._export import sample_targets as sample_targets
+from panoscene.eval._fov import FOV_DEG as FOV_DEG
 from panoscene.eval._fov import fov_sector as fov_sector
 from panoscene.eval._fov import run_by_fov as run_by_fov
 from panoscene.eval._fov import split_by_fov as split_by_fov
@@ -65,7 +68,6 @@ from panoscene.eval._published import PAPER_ABLATION as PAPER_ABLATION
 from panoscene.eval._published import PAPER_AP_COMMON as PAPER_AP_COMMON
 from panoscene.eval._published import PAPER_AP_FULL as PAPER_AP_FULL
 from panoscene.eval._published import PAPER_COLLISIONS as PAPER_COLLISIONS
-from panoscene.eval._published import PAPER_FOV_DEG as PAPER_FOV_DEG
 from panoscene.eval._published import PAPER_FOV_MAP_57 as PAPER_FOV_MAP_57
 from panoscene.eval._published import PAPER_MAP_57 as PAPER_MAP_57
 from panoscene.eval._published import PAPER_MAP_COMMON as PAPER_MAP_COMMON
@@ -83,10 +85,9 @@ from panoscene.eval._relation_records import YawErrors as YawErrors
 from panoscene.eval._relation_records import score_relations as score_relations
 from panoscene.eval._relation_scores import fidelity_record as fidelity_record
 from panoscene.eval._relation_scores import relation_record as relation_record
-from panoscene.eval._report import SUMMARY as SUMMARY
 from panoscene.eval._report import replace_between as replace_between
 from panoscene.eval._report import results_page as results_page
-from panoscene.eval._report import score_table as score_table
+from panoscene.eval._report import summary_note as summary_note
 from panoscene.eval._report import summary_table as summary_table
 from panoscene.eval._results import Measured as Measured
 from panoscene.eval._results import ScoreFile as ScoreFile
@@ -98,6 +99,9 @@ from panoscene.eval._scene_records import scene_records as scene_records
 from panoscene.eval._score import score_folder as score_folder
 from panoscene.eval._score_benchmark import run_score_benchmark as run_score_benchmark
 from panoscene.eval._score_benchmark import score_benchmark_table as score_benchmark_table
+from panoscene.eval._score_tables import SUMMARY as SUMMARY
+from panoscene.eval._score_tables import Column as Column
+from panoscene.eval._score_tables import score_table as score_table
 from panoscene.eval._semantic import SEMANTIC_POINTS as SEMANTIC_POINTS
 from panoscene.eval._semantic import SemanticRecord as SemanticRecord
 from panoscene.eval._semantic import SemanticScores as SemanticScores

@@ -6,7 +6,9 @@ weights can be compared scene by scene: the interval of a difference between two
 of the differences of their replicates.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from jaxtyping import Float, Int64
@@ -25,8 +27,12 @@ class Interval:
     confidence: float = 0.95
 
 
+REPLICATES = 1000
+"""Resamples behind the intervals, unless another number is asked for."""
+
+
 def bootstrap_weights(
-    scenes: int, rng: np.random.Generator, *, replicates: int = 1000
+    scenes: int, rng: np.random.Generator, *, replicates: int = REPLICATES
 ) -> Int64[np.ndarray, "replicates scenes"]:
     """Return how often each scene is drawn in each replicate; every row sums to ``scenes``.
 
@@ -137,12 +143,71 @@ def percentile_intervals(
         >>> percentile_intervals(np.array([50.0]), values, confidence=0.5)
         (Interval(estimate=50.0, low=25.0, high=75.0, confidence=0.5),)
     """
+    tails = _tails(confidence)
+    return _intervals(estimate, replicates, confidence, lambda _value, _known: tails)
+
+
+def bias_corrected_intervals(
+    estimate: Float[np.ndarray, " metrics"],
+    replicates: Float[np.ndarray, "replicates metrics"],
+    *,
+    confidence: float = 0.95,
+) -> tuple[Interval, ...]:
+    """Return ``percentile_intervals`` with percentiles moved against the bias of the replicates.
+
+    Average precision of a resample tends to be higher than that of the data, because a resample
+    holds fewer different scenes. Where a share p of the replicates is below the estimate, ties by
+    half, the percentiles a become Phi(2 Phi^-1(p) + Phi^-1(a)); with p = 1/2 nothing changes.
+
+    Args:
+        estimate: the metrics on all scenes.
+        replicates: the metrics on each resampled set of scenes; NaN is left out.
+        confidence: share of the replicates inside the interval if they have no bias, in (0, 1).
+
+    Raises:
+        ValueError: A confidence that is not in (0, 1).
+
+    Source: Efron, "Nonparametric standard errors and confidence intervals", 1981.
+
+    Examples:
+        >>> values = np.arange(101.0)[:, None]
+        >>> (plain,) = bias_corrected_intervals(np.array([50.0]), values, confidence=0.5)
+        >>> (moved,) = bias_corrected_intervals(np.array([40.0]), values, confidence=0.5)
+        >>> round(plain.low), round(plain.high), round(moved.low), round(moved.high)
+        (25, 75, 12, 57)
+    """
+    normal, (lower, upper) = NormalDist(), _tails(confidence)
+
+    def tails(value: float, known: Float[np.ndarray, " known"]) -> tuple[float, float]:
+        if np.isnan(value):
+            return lower, upper
+        below = float((known < value).mean() + (known == value).mean() / 2)
+        edge = 0.5 / len(known)
+        shift = 2 * normal.inv_cdf(min(max(below, edge), 1 - edge))
+        low, high = (normal.cdf(shift + normal.inv_cdf(tail)) for tail in (lower, upper))
+        return low, high
+
+    return _intervals(estimate, replicates, confidence, tails)
+
+
+def _tails(confidence: float) -> tuple[float, float]:
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must be in (0, 1), found {confidence}")
-    tails = ((1.0 - confidence) / 2, (1.0 + confidence) / 2)
+    return (1.0 - confidence) / 2, (1.0 + confidence) / 2
+
+
+def _intervals(
+    estimate: Float[np.ndarray, " metrics"],
+    replicates: Float[np.ndarray, "replicates metrics"],
+    confidence: float,
+    tails: Callable[[float, Float[np.ndarray, " known"]], tuple[float, float]],
+) -> tuple[Interval, ...]:
+    """Return the intervals between those percentiles that ``tails`` chooses for each metric."""
     intervals: list[Interval] = []
     for value, column in zip(estimate, replicates.T, strict=True):
         known = column[~np.isnan(column)]
-        low, high = np.quantile(known, tails) if len(known) else (np.nan, np.nan)
+        low = high = np.nan
+        if len(known):
+            low, high = np.quantile(known, tails(float(value), known))
         intervals.append(Interval(float(value), float(low), float(high), confidence))
     return tuple(intervals)

@@ -1,7 +1,7 @@
 """How well objects are detected: average precision, recall and precision of pooled scenes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int64
@@ -37,6 +37,21 @@ class DetectionScores:
     """Number of predicted objects at the operating point."""
     hits: Float[np.ndarray, "*replicates thresholds categories"]
     """Number of true positives at the operating point."""
+
+    def with_missing_areas_of(self, whole: "DetectionScores") -> "DetectionScores":
+        """Return these scores with the areas that do not exist taken from those of all scenes.
+
+        A category that is in few scenes is not in every resample of them. Left out there, it
+        would leave the mean, and means of different categories would be compared: rare ones have
+        low areas, so the resamples would look better than the data.
+        """
+        return replace(
+            self,
+            average_precision=_filled(self.average_precision, whole.average_precision),
+            released_average_precision=_filled(
+                self.released_average_precision, whole.released_average_precision
+            ),
+        )
 
     def mean_average_precision(
         self, categories: Sequence[str] = CATEGORIES
@@ -156,6 +171,10 @@ def _pooled(
 
 def _indices(categories: Sequence[str]) -> Int64[np.ndarray, " chosen"]:
     return np.array([category_index(name) for name in categories], dtype=np.int64)
+
+
+def _filled(values: np.ndarray, instead: np.ndarray) -> np.ndarray:
+    return np.where(np.isnan(values), instead, values)
 
 
 def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from panoscene.geometry import OrientedBoxes
 from panoscene.scene import Detections, Mesh, Objects, Relations, Scene, Shapes, select
 
 FOV_DEG = (360, 180, 120, 90, 60, 30)
-"""Horizontal fields of view of the paper's experiment, degrees."""
+"""Horizontal fields of view of the paper's experiment, degrees; the first is the whole room."""
 
 Seen = TypeVar("Seen", Scene, Detections)
 

@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
-from typing import Literal
+from dataclasses import astuple, dataclass, fields
+from operator import attrgetter
+from typing import Literal, get_args
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -29,6 +31,8 @@ from panoscene.scene import Scene
 
 CORNER_GROUPS = ("4", "6", "8", "10+", "odd", "overall")
 """Rows of the published layout tables: by the number of corners of the target."""
+
+Reading = Literal["regularised", "raw"]
 
 MISSING = "there is no prediction"
 """The problem of a scene that was not predicted at all."""
@@ -91,7 +95,7 @@ class LayoutRecord:
 class LayoutRow:
     """Mean layout measures of the scenes with one number of corners."""
 
-    reading: Literal["regularised", "raw"]
+    reading: Reading
     corners: str
     """One of ``CORNER_GROUPS``."""
     scenes: int
@@ -100,6 +104,11 @@ class LayoutRow:
     scale_error: float | None
     """Mean of ``|scale - 1|`` over scenes with a prediction."""
     mean: LayoutErrors
+
+
+_READINGS: tuple[Reading, ...] = get_args(Reading)
+_ERRORS = tuple(field.name for field in fields(LayoutErrors))
+_errors = attrgetter(*_ERRORS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,36 +185,47 @@ def score_layout(records: Sequence[LayoutRecord]) -> tuple[LayoutRow, ...]:
         >>> score_layout([])
         ()
     """
-    regularised = [(record, record.regularised) for record in records]
-    raw = [
-        (record, record.raw or record.regularised)
-        for record in records
-        if record.raw is not None or record.regularised.problem == MISSING
-    ]
-    rows = _rows("regularised", regularised)
-    return rows + _rows("raw", raw) if any(record.raw for record in records) else rows
+    return layout_of_sums(layout_sums(records).sum(axis=0)) if records else ()
 
 
-def _rows(
-    reading: Literal["regularised", "raw"], found: list[tuple[LayoutRecord, LayoutReading]]
-) -> tuple[LayoutRow, ...]:
+def layout_sums(records: Sequence[LayoutRecord]) -> Float[np.ndarray, "scenes columns"]:
+    """Return for each scene what it adds to each row: reading by reading, group by group."""
+    with_raw = any(record.raw is not None for record in records)
+    table = np.zeros((len(records), len(_READINGS), len(CORNER_GROUPS), 4 + len(_ERRORS)))
+    for scene, record in enumerate(records):
+        groups = [CORNER_GROUPS.index(_group(record.corners)), CORNER_GROUPS.index("overall")]
+        raw = record.raw
+        if raw is None and record.regularised.problem == MISSING:
+            raw = record.regularised
+        readings = (record.regularised, raw if with_raw else None)
+        scale_error = 0.0 if record.scale is None else abs(record.scale - 1)
+        for row, reading in enumerate(readings):
+            if reading is not None:
+                degenerate, scaled = reading.problem is not None, record.scale is not None
+                errors = _errors(reading.errors)
+                table[scene, row, groups] = (1, degenerate, scaled, scale_error, *errors)
+    return table.reshape(len(records), -1)
+
+
+def layout_of_sums(sums: Float[np.ndarray, " columns"]) -> tuple[LayoutRow, ...]:
+    """Return ``score_layout`` for added rows of ``layout_sums``."""
+    table = sums.reshape(len(_READINGS), len(CORNER_GROUPS), -1).tolist()
     rows: list[LayoutRow] = []
-    for group in CORNER_GROUPS:
-        chosen = [pair for pair in found if group in ("overall", _group(pair[0].corners))]
-        if not chosen:
-            continue
-        values = torch.tensor([astuple(one.errors) for _, one in chosen], dtype=torch.float64)
-        scales = [abs(record.scale - 1) for record, _ in chosen if record.scale is not None]
-        rows.append(
-            LayoutRow(
-                reading=reading,
-                corners=group,
-                scenes=len(chosen),
-                degenerate=sum(one.problem is not None for _, one in chosen),
-                scale_error=sum(scales) / len(scales) if scales else None,
-                mean=LayoutErrors(*values.mean(0).tolist()),
+    for reading, groups in zip(_READINGS, table, strict=True):
+        for group, numbers in zip(CORNER_GROUPS, groups, strict=True):
+            scenes, degenerate, scaled, scale_error, *errors = numbers
+            if not scenes:
+                continue
+            rows.append(
+                LayoutRow(
+                    reading=reading,
+                    corners=group,
+                    scenes=round(scenes),
+                    degenerate=round(degenerate),
+                    scale_error=scale_error / scaled if scaled else None,
+                    mean=LayoutErrors(*(error / scenes for error in errors)),
+                )
             )
-        )
     return tuple(rows)
 
 

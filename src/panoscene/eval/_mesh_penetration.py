@@ -164,16 +164,28 @@ def score_penetration(records: Sequence[PenetrationRecord]) -> dict[str, float |
     """
     if not records:
         raise ValueError("records: expected those of at least one scene, found none")
-    table = np.array([_numbers(record) for record in records], dtype=np.float64)
-    total = dict(zip(_NAMES, table.sum(axis=0).tolist(), strict=True))
-    scenes = len(records)
+    worst = max(record.worst_depth for record in records)
     return {
-        "scenes": float(scenes),
+        **penetration_of_sums(penetration_sums(records).sum(axis=0)),
+        "worst_penetration": worst,
+    }
+
+
+def penetration_sums(records: Sequence[PenetrationRecord]) -> Float[np.ndarray, "scenes columns"]:
+    """Return for each scene a 1 and the numbers of its record, to be added up."""
+    return np.array([(1, *_numbers(record)) for record in records], dtype=np.float64)
+
+
+def penetration_of_sums(sums: Float[np.ndarray, " columns"]) -> dict[str, float | None]:
+    """Return ``score_penetration`` for added rows of ``penetration_sums``, without the worst."""
+    scenes, *numbers = sums.tolist()
+    total = dict(zip(_NAMES, numbers, strict=True))
+    return {
+        "scenes": scenes,
         "penetrating_pairs": total["penetrating_pairs"] / scenes,
         "penetration_depth": total["depth"] / scenes,
         "penetration_volume": total["volume"] / scenes,
         "penetration_rate": ratio(total["penetrating_pairs"], total["pairs"]),
-        "worst_penetration": max(record.worst_depth for record in records),
         "hull_share": ratio(total["as_hull"], total["looked_at"]),
         "box_share": ratio(total["as_box"], total["looked_at"]),
     }

@@ -3,13 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, Protocol, runtime_checkable
 
 import torch
 
 from panoscene.arrange import PRESETS, arrange_scenes
-from panoscene.eval._fov import run_by_fov
+from panoscene.eval._fov import FOV_DEG, run_by_fov
 from panoscene.geometry import OrientedBoxes, direction_from_lonlat, wrap_angle
 from panoscene.scene import MEAN_SIZE, Layout, Objects, Scene, Shapes, relations_from_boxes
 
@@ -21,14 +22,36 @@ _CEILING = 2.6
 _FARTHEST = 8.0
 
 
-@dataclass(frozen=True, slots=True)
+@runtime_checkable
+class Simulate(Protocol):
+    """Makes estimates of all targets."""
+
+    def __call__(self, *, true_layout: bool = False, weak_relations: bool = False) -> list[Scene]:
+        """Return the same estimates of objects, in another layout or with worse relations."""
+        ...
+
+
+@dataclass(frozen=True)
 class Inputs:
-    """What methods may look at: the same rooms, one after the other."""
+    """What methods may look at: the same rooms, one after the other; made when asked for."""
 
     targets: Sequence[Scene]
-    estimates: Sequence[Scene]
-    in_true_layout: Sequence[Scene]
-    """The same estimates of objects, with the true layout and relations to its walls."""
+    simulate: Simulate
+
+    @cached_property
+    def estimates(self) -> list[Scene]:
+        """Return what the simulated networks say."""
+        return self.simulate()
+
+    @cached_property
+    def in_true_layout(self) -> list[Scene]:
+        """Return the same objects, with the true layout and relations to its walls."""
+        return self.simulate(true_layout=True)
+
+    @cached_property
+    def with_weak_relations(self) -> list[Scene]:
+        """Return the same objects and layout, with many more wrong relations."""
+        return self.simulate(weak_relations=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +63,8 @@ class Method:
     description: str
     run: Callable[[Inputs], list[Scene]]
     """To predictions, in the order of the targets."""
+    fov_deg: int = FOV_DEG[0]
+    """Horizontal degrees that it sees at a time."""
 
 
 def mean_box_scene(estimate: Scene) -> Scene:
@@ -104,9 +129,6 @@ def _by_fov(estimates: Sequence[Scene], fov_deg: int) -> list[Scene]:
     return [run_by_fov(lambda _part: next(repaired), scene, fov_deg) for scene in estimates]
 
 
-FOV_DEG = (180, 120, 90, 60, 30)
-"""Horizontal splits of the paper's experiment, besides the whole panorama."""
-
 METHODS = MappingProxyType(
     {
         "estimates": Method(
@@ -121,6 +143,11 @@ METHODS = MappingProxyType(
             "released",
             "estimates repaired with the authors' released settings",
             lambda inputs: _arranged(inputs.estimates, "released"),
+        ),
+        "default-weak": Method(
+            "ours",
+            "default, told relations that are about as wrong as the paper's network's",
+            lambda inputs: _arranged(inputs.with_weak_relations, "default"),
         ),
         "mean-box": Method(
             "baseline",
@@ -146,8 +173,9 @@ METHODS = MappingProxyType(
             "ours",
             f"default, each split of {fov} degrees on its own",
             lambda inputs, fov=fov: _by_fov(inputs.estimates, fov),
+            fov_deg=fov,
         )
-        for fov in FOV_DEG
+        for fov in FOV_DEG[1:]
     }
 )
 """Every method by the name of its folder of predictions."""

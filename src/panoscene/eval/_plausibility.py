@@ -6,7 +6,7 @@ from operator import attrgetter
 
 import numpy as np
 import torch
-from jaxtyping import Int64
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from panoscene.eval._padded_rooms import PaddedRooms, padded_rooms
@@ -196,14 +196,25 @@ def score_plausibility(records: Sequence[PlausibilityRecord]) -> dict[str, float
     """
     if not records:
         raise ValueError("records: expected those of at least one scene, found none")
+    return plausibility_of_sums(plausibility_sums(records).sum(axis=0))
+
+
+def plausibility_sums(
+    records: Sequence[PlausibilityRecord],
+) -> Float[np.ndarray, "scenes columns"]:
+    """Return for each scene a 1 and the numbers of its record, to be added up."""
+    return np.array([(1, *_numbers(record)) for record in records], dtype=np.float64)
+
+
+def plausibility_of_sums(sums: Float[np.ndarray, " columns"]) -> dict[str, float | None]:
+    """Return ``score_plausibility`` for added rows of ``plausibility_sums``."""
     names = [field.name for field in fields(PlausibilityRecord)]
-    table = np.array([_numbers(record) for record in records], dtype=np.float64)
-    total = dict(zip(names, table.sum(axis=0).tolist(), strict=True))
-    scenes = len(records)
+    scenes, *numbers = sums.tolist()
+    total = dict(zip(names, numbers, strict=True))
     per_scene = [name for name in names if name.startswith("paper_")]
     per_scene += ["objects", "out_of_room_volume", "floating"]
     return {
-        "scenes": float(scenes),
+        "scenes": scenes,
         **{name: total[name] / scenes for name in per_scene},
         "collision_rate": ratio(total["paper_colliding_pairs"], total["pairs"]),
         "out_of_room_share": ratio(total["out_of_room_volume"], total["box_volume"]),

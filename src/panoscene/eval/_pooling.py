@@ -3,21 +3,28 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int64
 
-from panoscene.eval._bootstrap import bootstrap_weights, percentile_intervals
+from panoscene.eval._bootstrap import bias_corrected_intervals, bootstrap_weights
 from panoscene.eval._detection import DetectionScores, score_detection
 from panoscene.eval._detection_records import DetectionRecord, pool_match_errors
-from panoscene.eval._layout_scores import LayoutRecord, score_layout
-from panoscene.eval._mesh_penetration import score_penetration
-from panoscene.eval._plausibility import PlausibilityRecord, score_plausibility
-from panoscene.eval._relation_records import score_relations
+from panoscene.eval._layout_scores import layout_of_sums, layout_sums
+from panoscene.eval._mesh_penetration import (
+    penetration_of_sums,
+    penetration_sums,
+    score_penetration,
+)
+from panoscene.eval._plausibility import (
+    PlausibilityRecord,
+    plausibility_of_sums,
+    plausibility_sums,
+)
+from panoscene.eval._relation_records import relation_sums, relations_of_sums
 from panoscene.eval._results import Measured
 from panoscene.eval._scene_records import SceneRecords
-from panoscene.eval._semantic import SemanticRecord, score_semantic
+from panoscene.eval._semantic import SemanticRecord, label_ious, mean_ious
 from panoscene.eval._shape_scores import score_shapes
 from panoscene.scene import CATEGORIES, COMMON_11, PANOCONTEXT_12
 
@@ -25,7 +32,10 @@ RECALL_LEVELS = (0.2, 0.4, 0.6)
 """Recalls at which methods are compared as equals."""
 
 Values = dict[str, float | None]
-Record = TypeVar("Record")
+Table = Float[np.ndarray, "scenes columns"]
+"""Numbers of each scene; the scores of a set of scenes follow from their sums."""
+Score = Callable[[Float[np.ndarray, " columns"]], Values]
+"""From sums over scenes to named scores."""
 
 
 def pooled_metrics(
@@ -48,32 +58,35 @@ def pooled_metrics(
     """
     if not records:
         raise ValueError("records: expected those of at least one scene, found none")
-    parts: list[tuple[str, Callable[[list[int]], Values]]] = [
-        ("plausibility", _pool([r.plausibility for r in records], score_plausibility)),
-        ("fidelity", _pool([r.fidelity for r in records], score_relations)),
-        ("layout", _pool([r.layout for r in records], layout_values)),
-        ("semantic", _pool([r.semantic for r in records], semantic_values)),
-    ]
-    answered = [record.relations for record in records]
-    if all(record is not None for record in answered):
-        known = [record for record in answered if record is not None]
-        parts.append(("relations", _pool(known, score_relations)))
+    boxes = [record.plausibility for record in records]
+    parts: dict[str, tuple[Table, Score]] = {
+        "plausibility": (plausibility_sums(boxes), plausibility_of_sums),
+        "fidelity": (relation_sums([r.fidelity for r in records]), relations_of_sums),
+        "layout": (layout_sums([r.layout for r in records]), layout_values),
+        "semantic": _semantic_part([r.semantic for r in records]),
+    }
+    relations = [record.relations for record in records if record.relations is not None]
+    if len(relations) == len(records):
+        parts["relations"] = (relation_sums(relations), relations_of_sums)
     for level, kept in at_recall.items():
         if kept is not None:
             name = f"plausibility_at_recall_{round(100 * level)}"
-            parts.append((name, _pool(list(kept), score_plausibility)))
-    shapes = [record.shape for record in records if record.shape is not None]
+            parts[name] = (plausibility_sums(kept), plausibility_of_sums)
+    depths = [record.penetration for record in records if record.penetration is not None]
+    if len(depths) == len(records):
+        parts["penetration"] = (penetration_sums(depths), penetration_of_sums)
     weights = (
         bootstrap_weights(len(records), np.random.default_rng(seed), replicates=replicates)
         if replicates
         else np.zeros((0, len(records)), dtype=np.int64)
     )
     measured = _detection_metrics([record.detection for record in records], weights)
-    for name, pool in parts:
-        measured |= _with_intervals(name, pool, weights)
-    depths = [record.penetration for record in records if record.penetration is not None]
-    if depths:
-        measured |= _with_intervals("penetration", _pool(depths, score_penetration), weights)
+    for name, (table, score) in parts.items():
+        measured |= _with_intervals(name, table, score, weights)
+    if "penetration" in parts:
+        worst = score_penetration(depths)["worst_penetration"]
+        measured["penetration.worst_penetration"] = Measured(value=finite(worst))
+    shapes = [record.shape for record in records if record.shape is not None]
     if shapes:
         values = {"shape." + key: value for key, value in _flat(asdict(score_shapes(shapes)))}
         measured |= {key: Measured(value=value) for key, value in values.items()}
@@ -111,24 +124,16 @@ def detection_values(scores: DetectionScores) -> dict[str, Float[np.ndarray, "*r
     return values
 
 
-def layout_values(records: Sequence[LayoutRecord]) -> Values:
+def layout_values(sums: Float[np.ndarray, " columns"]) -> Values:
     """Return the layout scores by reading, number of corners and measure."""
     values: Values = {}
-    for row in score_layout(records):
+    for row in layout_of_sums(sums):
         start = f"{row.reading}.{row.corners}"
         values[f"{start}.scenes"] = float(row.scenes)
         values[f"{start}.degenerate"] = float(row.degenerate)
         values[f"{start}.scale_error"] = row.scale_error
-        if row.scenes:
-            values |= {f"{start}.{key}": value for key, value in asdict(row.mean).items()}
+        values |= {f"{start}.{key}": value for key, value in asdict(row.mean).items()}
     return values
-
-
-def semantic_values(records: Sequence[SemanticRecord]) -> Values:
-    """Return the IoU of each of the 12 labels, and their means."""
-    scores = score_semantic(records)
-    values: Values = dict(zip(PANOCONTEXT_12, scores.iou.tolist(), strict=True))
-    return values | {"mean": scores.mean_iou, "mean_objects": scores.mean_iou_objects}
 
 
 def finite(value: float | None) -> float | None:
@@ -139,11 +144,13 @@ def finite(value: float | None) -> float | None:
 def _detection_metrics(
     records: Sequence[DetectionRecord], weights: Int64[np.ndarray, "replicates scenes"]
 ) -> dict[str, Measured]:
-    values = detection_values(score_detection(records))
-    measured = _measured(
-        {name: float(value) for name, value in values.items()},
-        detection_values(score_detection(records, weights=weights)) if len(weights) else {},
-    )
+    whole = score_detection(records)
+    drawn: dict[str, np.ndarray] = {}
+    if len(weights):
+        resampled = score_detection(records, weights=weights)
+        drawn = detection_values(resampled.with_missing_areas_of(whole))
+    values = {name: float(value) for name, value in detection_values(whole).items()}
+    measured = _measured(values, drawn)
     errors = pool_match_errors(records)
     for name in ("iou", "centre_error", "yaw_error", "size_error"):
         column = getattr(errors, name)
@@ -151,23 +158,30 @@ def _detection_metrics(
     return {f"detection.{name}": value for name, value in measured.items()}
 
 
-def _pool(
-    records: Sequence[Record], score: Callable[[Sequence[Record]], Mapping[str, float | None]]
-) -> Callable[[list[int]], Values]:
-    def chosen(scenes: list[int]) -> Values:
-        return dict(score([records[scene] for scene in scenes]))
+def _semantic_part(records: Sequence[SemanticRecord]) -> tuple[Table, Score]:
+    """Return the counts of each scene, and the IoU of each of the 12 labels with their means.
 
-    return chosen
+    A label that a resample does not have keeps its IoU over all scenes, as in detection.
+    """
+    counts = np.stack([record.confusion for record in records]).astype(np.float64)
+    whole = label_ious(counts.sum(axis=0))
+
+    def score(sums: Float[np.ndarray, " columns"]) -> Values:
+        iou = label_ious(sums.reshape(counts.shape[1:]))
+        iou = np.where(np.isnan(iou), whole, iou)
+        mean, of_objects = mean_ious(iou)
+        values: Values = dict(zip(PANOCONTEXT_12, iou.tolist(), strict=True))
+        return values | {"mean": mean, "mean_objects": of_objects}
+
+    return counts.reshape(len(records), -1), score
 
 
 def _with_intervals(
-    group: str,
-    pool: Callable[[list[int]], Values],
-    weights: Int64[np.ndarray, "replicates scenes"],
+    group: str, table: Table, score: Score, weights: Int64[np.ndarray, "replicates scenes"]
 ) -> dict[str, Measured]:
-    scenes = np.arange(weights.shape[1])
-    values = pool(scenes.tolist())
-    again = [pool(np.repeat(scenes, row).tolist()) for row in weights]
+    """Return scores of added rows of a table, with intervals from resampled rows."""
+    values = score(table.sum(axis=0))
+    again = [score(sums) for sums in weights @ table]
     columns = {
         name: np.array([_number(draw.get(name)) for draw in again], dtype=np.float64)
         for name in (values if again else ())
@@ -183,7 +197,7 @@ def _measured(
         low = high = None
         if name in replicates:
             column = np.asarray(replicates[name], dtype=np.float64)[:, None]
-            (interval,) = percentile_intervals(np.array([_number(value)]), column)
+            (interval,) = bias_corrected_intervals(np.array([_number(value)]), column)
             low, high = interval.low, interval.high
         result[name] = Measured(value=finite(value), low=finite(low), high=finite(high))
     return result
@@ -198,6 +212,8 @@ def _flat(values: Mapping[str, object], start: str = "") -> list[tuple[str, floa
     for name, value in values.items():
         if isinstance(value, Mapping):
             flat += _flat(value, f"{start}{name}.")
-        elif value is None or isinstance(value, int | float):
-            flat.append((start + name, finite(value)))
+        elif value is None:
+            flat.append((start + name, None))
+        elif isinstance(value, int | float):
+            flat.append((start + name, finite(float(value))))
     return flat

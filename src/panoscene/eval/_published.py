@@ -139,16 +139,13 @@ PAPER_ABLATION: Mapping[str, PaperAblation] = MappingProxyType(
 )
 """Source: paper, ablation table. Fr are relation features, Fo object features, E the energies."""
 
-PAPER_FOV_DEG = (360, 180, 120, 90, 60, 30)
-"""Horizontal fields of view of the paper's table, degrees."""
-
 PAPER_FOV_MAP_57: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {
         "Ours w/o RO": (30.91, 27.4, 24.77, 25.90, 26.16, 25.51),
         "Ours Full": (33.92, 26.09, 24.34, 23.01, 21.72, 18.52),
     }
 )
-"""Mean AP over "57 categories" at each of ``PAPER_FOV_DEG``, per cent.
+"""Mean AP over "57 categories" at each of ``FOV_DEG``, per cent.
 
 "Ours Full" at 360 degrees is 33.92 here and 33.59 in the paper's other tables.
 """

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import chain, islice
 from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from panoscene.eval._plausibility import ratio
 
@@ -95,13 +97,24 @@ def score_relations(records: Sequence[RelationRecord]) -> dict[str, float | None
     """
     if not records:
         raise ValueError("records: expected those of at least one scene, found none")
-    scores: dict[str, float | None] = {"scenes": float(len(records))}
+    return relations_of_sums(relation_sums(records).sum(axis=0))
+
+
+def relation_sums(records: Sequence[RelationRecord]) -> Float[np.ndarray, "scenes columns"]:
+    """Return for each scene a 1 and the numbers of its record, to be added up."""
+    parts = attrgetter(*YES_OR_NO, *TURNS)
+    return np.array([(1, *chain(*parts(record))) for record in records], dtype=np.float64)
+
+
+def relations_of_sums(sums: Float[np.ndarray, " columns"]) -> dict[str, float | None]:
+    """Return ``score_relations`` for added rows of ``relation_sums``."""
+    numbers = iter(sums.tolist())
+    scores: dict[str, float | None] = {"scenes": next(numbers)}
     for name in YES_OR_NO:
-        counts = np.array([*map(attrgetter(name), records)], dtype=np.float64).sum(axis=0)
-        scores |= {f"{name}_{key}": value for key, value in _yes_or_no(*counts.tolist()).items()}
+        counts = _yes_or_no(*islice(numbers, len(RelationCounts._fields)))
+        scores |= {f"{name}_{key}": value for key, value in counts.items()}
     for name in TURNS:
-        counts = np.array([*map(attrgetter(name), records)], dtype=np.float64).sum(axis=0)
-        compared, in_target, bin_error, error = counts.tolist()
+        compared, in_target, bin_error, error = islice(numbers, len(YawErrors._fields))
         scores |= {
             f"{name}_bin_error_deg": ratio(bin_error, compared),
             f"{name}_error_deg": ratio(error, compared),

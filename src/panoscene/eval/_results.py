@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -37,6 +38,8 @@ class ScoreFile(_Model):
     kind: str
     """ours, released, input, baseline, oracle, or prediction for anybody's folder."""
     description: str
+    fov_deg: Annotated[int, Field(ge=1, le=360)] = 360
+    """Horizontal degrees that the method saw at a time; 360 is the whole room."""
     data: str
     """What the targets are."""
     scenes: Annotated[int, Field(ge=0)]
@@ -58,8 +61,7 @@ class ScoreFile(_Model):
 
 def write_scores(scores: ScoreFile, path: str | os.PathLike[str]) -> None:
     """Write a file of scores; it appears complete or not at all."""
-    text = json.dumps(scores.model_dump(by_alias=True), indent=1)
-    write_atomically(Path(path), text + "\n")
+    write_atomically(Path(path), _one_metric_a_line(scores.model_dump(by_alias=True)) + "\n")
 
 
 def read_scores(path: str | os.PathLike[str]) -> ScoreFile:
@@ -79,3 +81,19 @@ def read_scores(path: str | os.PathLike[str]) -> ScoreFile:
             for detail in error.errors(include_url=False)[:5]
         ]
         raise SceneFormatError(os.fspath(path), problems) from None
+
+
+def _one_metric_a_line(document: Mapping[str, object]) -> str:
+    """Return JSON with a line for each fact, metric and category."""
+    lines: list[str] = []
+    for key, value in document.items():
+        if isinstance(value, Mapping):
+            rows = ",\n".join(f"  {_line(name)}: {_line(row)}" for name, row in value.items())
+            lines.append(f" {_line(key)}: {{\n{rows}\n }}" if rows else f" {_line(key)}: {{}}")
+        else:
+            lines.append(f" {_line(key)}: {_line(value)}")
+    return "{\n" + ",\n".join(lines) + "\n}"
+
+
+def _line(value: object) -> str:
+    return json.dumps(value, allow_nan=False)

@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 
 from panoscene import __version__
+from panoscene.eval._bootstrap import REPLICATES
 from panoscene.eval._pooling import RECALL_LEVELS, pooled_categories, pooled_metrics
 from panoscene.eval._results import ScoreFile
 from panoscene.eval._scene_records import SceneRecords, records_at_recall, scene_records
@@ -27,9 +28,10 @@ def score_folder(
     method: str = "",
     kind: str = "prediction",
     description: str = "",
+    fov_deg: int = 360,
     data: str = "",
     shapes: bool = False,
-    replicates: int = 400,
+    replicates: int = REPLICATES,
     seed: int = 0,
     workers: int = 1,
     progress: Callable[[int], None] | None = None,
@@ -45,6 +47,7 @@ def score_folder(
         method: name of the row in tables; that of the folder when empty.
         kind: as in ``METHODS``.
         description: one line about the method.
+        fov_deg: horizontal degrees that the method saw at a time.
         data: what the targets are.
         shapes: also compare meshes, where the targets have them; slower.
         replicates: bootstrap resamples of the scenes for the 95 % intervals.
@@ -79,6 +82,7 @@ def score_folder(
         method=method or predictions.name,
         kind=kind,
         description=description,
+        fov_deg=fov_deg,
         data=data,
         scenes=len(records),
         objects=sum(record.targets for record in records),

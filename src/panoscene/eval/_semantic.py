@@ -113,28 +113,38 @@ def score_semantic(records: Sequence[SemanticRecord]) -> SemanticScores:
         >>> score_semantic([]).scenes
         0
     """
-    confusion = torch.zeros(_LABELS, _LABELS + 1, dtype=torch.int64)
+    confusion = np.zeros((_LABELS, _LABELS + 1))
     for record in records:
-        confusion = confusion + torch.from_numpy(record.confusion)
-    agreed = confusion.diagonal()
-    union = confusion.sum(1) + confusion[:, :_LABELS].sum(0) - agreed
-    iou = agreed.double() / union  # 0 / 0 is NaN
-    objects = torch.arange(_LABELS) != BACKGROUND
+        confusion += record.confusion
+    iou = label_ious(confusion)
+    absent = [name for name, value in zip(PANOCONTEXT_12, iou, strict=True) if np.isnan(value)]
+    mean, of_objects = mean_ious(iou)
     return SemanticScores(
-        iou=iou.float(),
-        mean_iou=_mean_of_known(iou),
-        mean_iou_objects=_mean_of_known(iou[objects]),
-        absent=tuple(
-            name for name, here in zip(PANOCONTEXT_12, union.tolist(), strict=True) if not here
-        ),
+        iou=torch.from_numpy(iou).float(),
+        mean_iou=mean,
+        mean_iou_objects=of_objects,
+        absent=tuple(absent),
         scenes=len(records),
         missing=sum(int(record.confusion[:, -1].sum()) > 0 for record in records),
         boxes_around_camera=sum(record.boxes_around_camera for record in records),
     )
 
 
-def _mean_of_known(values: Float[Tensor, " n"]) -> float | None:
-    known = values[~values.isnan()]
+def label_ious(confusion: Float[np.ndarray, "12 13"]) -> Float[np.ndarray, "12"]:
+    """Return the IoU of each label from added counts of directions; NaN for one that is absent."""
+    agreed = confusion.diagonal()
+    union = confusion.sum(axis=1) + confusion[:, :_LABELS].sum(axis=0) - agreed
+    return np.divide(agreed, union, out=np.full(_LABELS, np.nan), where=union > 0)
+
+
+def mean_ious(iou: Float[np.ndarray, "12"]) -> tuple[float | None, float | None]:
+    """Return the mean over the labels that are there, and the same without background."""
+    objects = np.arange(_LABELS) != BACKGROUND
+    return _mean_of_known(iou), _mean_of_known(iou[objects])
+
+
+def _mean_of_known(values: Float[np.ndarray, " n"]) -> float | None:
+    known = values[~np.isnan(values)]
     return float(known.mean()) if len(known) else None
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from panoscene.exports._plan_dimensions import Dimension, plan_dimensions
 from panoscene.exports._plan_labels import LABEL_MM, Label, place_labels
 from panoscene.exports._plan_openings import Opening, find_openings
-from panoscene.geometry import box_footprint
+from panoscene.geometry import box_footprint, polygon_turn
 from panoscene.scene import CATEGORIES, Scene, object_names, scene_to_json
 from panoscene.style import NO_FRONT, OVERHEAD, WALL_THICKNESS
 
@@ -104,7 +104,7 @@ def floor_plan(scene: Scene) -> FloorPlan:
         SceneFormatError: the scene has numbers that are not finite or a room that is none.
     """
     scene_to_json(replace(scene, relations=None))
-    turn = _room_turn(scene)
+    turn = polygon_turn(scene.layout.floor_polygon)
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     corners = scene.layout.floor_polygon.double().numpy(force=True) @ rotation.T
     floor = shapely.Polygon(corners)
@@ -151,15 +151,6 @@ def furniture_hull(
     """Return left, bottom, right, top of walls and furniture, which dimensions stay clear of."""
     outside = floor.buffer(WALL_THICKNESS, join_style="mitre")
     return shapely.unary_union([outside, *(piece.shape for piece in furniture)]).bounds
-
-
-def _room_turn(scene: Scene) -> float:
-    """Return the smallest turn that lays most of the wall along the page's edges."""
-    corners = scene.layout.floor_polygon.double().numpy(force=True)
-    wall = np.roll(corners, -1, axis=0) - corners
-    # four times the angle is the same for walls at right angles
-    four = np.hypot(*wall.T) * np.exp(4j * np.arctan2(wall[:, 1], wall[:, 0]))
-    return float(-np.angle(four.sum()) / 4)
 
 
 def _footprints(

@@ -12,6 +12,8 @@ from panoscene.style import WALL_THICKNESS
 
 FIRST_MM, ROW_MM = 9.0, 7.0
 """On paper: from the plan to the first row of dimensions, and between rows."""
+NARROW_MM = 20.0
+"""On paper, between inner faces: in a nook as narrow as this there is room for one dimension."""
 SHORTEST = 0.02
 """Metres; shorter pieces of wall are not dimensioned."""
 _SQUARE = 1e-3
@@ -76,7 +78,8 @@ def plan_dimensions(
 
     Walls along the page's edges are dimensioned in rows outside of everything: parts between
     openings, walls, the whole side. Other walls, and those that look at another wall across a
-    nook, are dimensioned next to themselves.
+    nook, are dimensioned next to themselves; of two equal walls on both sides of a narrow nook only
+    the first.
 
     Args:
         corners: Inner faces of the walls, counter-clockwise.
@@ -96,7 +99,10 @@ def plan_dimensions(
         if square and _is_free(corners, wall, out, taken):
             sides.setdefault((round(out[0]), round(out[1])), []).append(wall)
             continue
-        place = corners[wall] + (WALL_THICKNESS + first / 2) * out
+        gap, twin = _across(corners, wall)
+        if twin is not None and twin < wall and gap < NARROW_MM * scale / 1000:
+            continue
+        place = corners[wall] + min(WALL_THICKNESS + first / 2, gap / 2) * out
         for run in _rows(corners, along, length, wall, openings):
             found += run.dimensions(place)
             place = place + row * out
@@ -145,6 +151,29 @@ def _whole(
     low, high = float(place.min()), float(place.max())
     start = corners[walls[0]]
     return _Run(start + (low - float(start @ along)) * along, along, (0.0, high - low), None)
+
+
+def _across(corners: Float[np.ndarray, "corners 2"], wall: int) -> tuple[float, int | None]:
+    """Return how far behind a wall the next parallel one is, and that one if it mirrors it.
+
+    Infinity and None when there is none; behind is outside of the room.
+    """
+    ends = np.roll(corners, -1, axis=0)
+    length = float(np.linalg.norm(ends[wall] - corners[wall]))
+    along = (ends[wall] - corners[wall]) / length
+    out = np.array([along[1], -along[0]])
+    # from the wall's start: along it, and outwards
+    starts, stops = (
+        (points - corners[wall]) @ np.stack([along, out], axis=1) for points in (corners, ends)
+    )
+    level = np.abs(starts[:, 1] - stops[:, 1]) < _SQUARE
+    facing = (starts[:, 0] > _SQUARE) & (stops[:, 0] < length - _SQUARE)
+    behind = level & facing & (starts[:, 0] > stops[:, 0]) & (starts[:, 1] > _SQUARE)
+    if not behind.any():
+        return np.inf, None
+    nearest = int(np.argmin(np.where(behind, starts[:, 1], np.inf)))
+    same = abs(starts[nearest, 0] - length) < SHORTEST and abs(stops[nearest, 0]) < SHORTEST
+    return float(starts[nearest, 1]), nearest if same else None
 
 
 def _is_free(

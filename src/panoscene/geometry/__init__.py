@@ -64,6 +64,7 @@ from panoscene.geometry._polygon_validity import (
 )
 from panoscene.geometry._polygon_validity import polygon_iou as polygon_iou
 from panoscene.geometry._polygon_validity import polygon_problem as polygon_problem
+from panoscene.geometry._polygon_validity import polygon_turn as polygon_turn
 from panoscene.geometry._resample import panorama_directions as panorama_directions
 from panoscene.geometry._resample import rotate_panorama as rotate_panorama
 from panoscene.geometry._resample import sample_panorama as sample_panorama

@@ -54,6 +54,31 @@ def _written(corner: Float[Tensor, "2"]) -> str:
     return f"({float(corner[0]):g}, {float(corner[1]):g})"
 
 
+def polygon_turn(polygon: Float[Tensor, "corners 2"]) -> float:
+    """Return the smallest turn that lays most of the wall along the axes, in radians.
+
+    Counter-clockwise, within pi / 4. Minus the turn is the direction of the walls, up to quarter
+    turns: the length-weighted mean of the walls' own directions.
+
+    Convention:
+        - padding by repeated corners changes nothing
+        - 0 for a polygon whose walls have no common direction, such as a regular pentagon, up to
+          rounding
+
+    Examples:
+        >>> room = torch.tensor([[2.0, 0.0], [4.0, 2.0], [2.0, 4.0], [0.0, 2.0]])
+        >>> round(abs(polygon_turn(room)), 4)  # by an eighth of a full turn, either way
+        0.7854
+    """
+    corner = polygon.detach().double()
+    along = corner.roll(-1, dims=0) - corner
+    length = torch.hypot(along[:, 0], along[:, 1])
+    direction = torch.atan2(along[:, 1], along[:, 0])
+    # four times the angle is the same for all four directions of a Manhattan room
+    across = torch.sum(length * torch.sin(4 * direction))
+    return float(-torch.atan2(across, torch.sum(length * torch.cos(4 * direction))) / 4)
+
+
 def is_manhattan(polygon: Float[Tensor, "corners 2"], tolerance: float = 0.01) -> bool:
     """Return whether all walls are parallel or perpendicular to each other.
 
@@ -67,11 +92,7 @@ def is_manhattan(polygon: Float[Tensor, "corners 2"], tolerance: float = 0.01) -
     along = polygon.detach().roll(-1, dims=0) - polygon.detach()
     length = torch.hypot(along[:, 0], along[:, 1])
     direction = torch.atan2(along[:, 1], along[:, 0])
-    # four times the angle is the same for all four directions of a Manhattan room
-    axis = torch.atan2(
-        torch.sum(length * torch.sin(4 * direction)), torch.sum(length * torch.cos(4 * direction))
-    )
-    turn = 4 * direction - axis
+    turn = 4 * (direction + polygon_turn(polygon))
     deviation = torch.atan2(torch.sin(turn), torch.cos(turn)).abs() / 4
     return bool(torch.all((deviation <= tolerance) | (length < COINCIDENT)))
 

@@ -25,6 +25,8 @@ from ._files import write_scene as write_scene
 from ._graph import relation_graph as relation_graph
 from ._graph import write_graphml as write_graphml
 from ._images import read_panorama as read_panorama
+from ._photos import relocate_photo as relocate_photo
+from ._photos import upright_photo as upright_photo
 from ._records import Detections as Detections
 from ._records import Layout as Layout
 from ._records import Mesh as Mesh

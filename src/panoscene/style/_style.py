@@ -27,7 +27,7 @@ WALL_THICKNESS = 0.12
 MOST_WALL = 15.0
 """Pixels."""
 THIN, OUTLINE, FRONT, HEAVY = 1.0, 1.4, 3.4, 2.6
-CONTACT_WIDTH, CONTACT_RIM = 4.6, 1.5
+CONTACT_WIDTH, CONTACT_RIM = 3.8, 1.4
 MARGIN = 24.0
 OPAQUE, SEE_THROUGH = 0.88, 0.45
 """Of fills; overhead pieces and carpets are see-through."""
@@ -71,12 +71,13 @@ GROUP_COLOURS = MappingProxyType(
         "bathroom": "#99ddff",
         "lamps and decoration": "#ee8866",
         "devices and leisure": "#9a8aad",
-        "doors and windows": "#e6e8ec",
+        "doors and windows": "#758587",
     }
 )
 """Fills that carry dark text and stay apart for colour-blind readers, which a test simulates.
 
-Seven are from Paul Tol's light scheme; mauve and pale grey are chosen to stay apart from them.
+Seven are from Paul Tol's light scheme; mauve and grey are chosen to stay apart from them and from
+floor and walls.
 """
 
 NO_FRONT = ("carpet", *GROUPS["doors and windows"])

@@ -1,12 +1,12 @@
 """Starting and stopping the live editor."""
 
 import errno
+import logging
 import os
 import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -15,7 +15,7 @@ import viser
 from jaxtyping import Float
 from torch import Tensor
 
-from panoscene.scene import Scene, read_panorama, read_scene
+from panoscene.scene import Scene, read_panorama, read_scene, relocate_photo, upright_photo
 from panoscene.style import INK
 
 from ._app import ViewerApp
@@ -91,6 +91,8 @@ def serve(
             derived.
     """
     _check_address(host, port)
+    # port scanners, and browsers that open connections in advance: no reason for a traceback
+    logging.getLogger("websockets.server").addFilter(_STRANGERS)
     with _silent():
         server = _LocalServer(host=host, port=port, label="panoscene", verbose=False)
     if port not in (0, server.get_port()):
@@ -126,7 +128,8 @@ def view_file(
         path: a scene.json file.
         host: address to listen on.
         port: 0 takes any free one.
-        photo: the panorama; without it the one the scene names, if that is there.
+        photo: the panorama; without it the one the scene names, if that is there. A tilted one is
+            turned upright, as the scene says.
         save_to: file that the button Save writes; without it there is only Download.
 
     Raises:
@@ -139,13 +142,22 @@ def view_file(
     named = scene.panorama.file
     if photo is None and named is not None and (path.parent / named).is_file():
         photo = path.parent / named
-    image = None if photo is None else read_panorama(photo)[0]
+    image = None if photo is None else upright_photo(read_panorama(photo)[0], scene.panorama)
     target = None if save_to is None else Path(save_to)
-    if target is not None and named is not None:
-        scene = replace(
-            scene, panorama=replace(scene.panorama, file=_seen_from(path, named, target))
-        )
+    if target is not None:
+        scene = relocate_photo(scene, path, target)
     return serve(scene, host=host, port=port, image=image, save_to=target)
+
+
+class _StrangersFilter(logging.Filter):
+    """Drops what the server says of those who connect and do not speak its language."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether a message is worth a line on the terminal."""
+        return record.getMessage() != "opening handshake failed"
+
+
+_STRANGERS = _StrangersFilter()
 
 
 class _LocalServer(viser.ViserServer):
@@ -196,11 +208,3 @@ def _silent() -> Iterator[None]:
         yield
     finally:
         console.quiet = before
-
-
-def _seen_from(source: Path, named: str, target: Path) -> str:
-    """Return the photo's path relative to where the scene will be."""
-    try:
-        return Path(os.path.relpath(source.parent / named, target.parent)).as_posix()
-    except ValueError:  # another drive
-        return (source.parent / named).resolve().as_posix()

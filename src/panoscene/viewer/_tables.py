@@ -75,8 +75,7 @@ def certificate_text(certificate: Certificate) -> str:
     before, after, rows = certificate.before, certificate.after, (*ROWS, ENERGY)
     table = violations_table(before, after, ("Before", "After"), rows)
     words = f"{certificate.outcome.capitalize()}, preset {certificate.preset}"
-    words += f", {certificate.steps} steps, "
-    words += "converged." if certificate.converged else "not yet converged."
+    words += f", {certificate.steps} steps."
     words += f" Sizes changed by at most {100 * (certificate.largest_size_change - 1):.0f} %."
     if certificate.left_outside:
         words += f" Not meant to be in the room, left there: {certificate.left_outside}."

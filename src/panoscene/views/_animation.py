@@ -13,11 +13,11 @@ from jaxtyping import Float
 from PIL import Image
 
 from panoscene.arrange import ArrangementSettings, arrange, collate_scenes, energy
-from panoscene.geometry import OrientedBoxes
+from panoscene.geometry import OrientedBoxes, polygon_turn
 from panoscene.scene import Scene, relations_from_boxes, write_atomically
 from panoscene.views._attachments import joints_from_relations
 from panoscene.views._cameras import FreeCamera
-from panoscene.views._default_view import default_view, wall_angle
+from panoscene.views._default_view import default_view
 from panoscene.views._frames import Stage, draw_frame
 
 _FORMATS = (".webp", ".gif")
@@ -151,7 +151,7 @@ def _turn(scene: Scene, camera: FreeCamera) -> float:
     """Return the turn that lays walls along the page, with the camera's far side up."""
     x, y = (b - a for a, b in zip(camera.eye[:2], camera.target[:2], strict=True))
     up = math.pi / 2 - math.atan2(y, x)
-    walls = -wall_angle(scene)
+    walls = polygon_turn(scene.layout.floor_polygon)
     return walls + round((up - walls) / (math.pi / 2)) * (math.pi / 2)
 
 

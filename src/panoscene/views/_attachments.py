@@ -102,9 +102,13 @@ def wall_contacts(boxes: OrientedBoxes, layout: Layout, joints: Joints) -> Segme
         line = shapely.LineString([polygon[wall], polygon[(wall + 1) % len(polygon)]])
         gap = shapes[k].distance(line)
         near = shapes[k].intersection(line.buffer(gap + 0.03, cap_style="flat"))
-        place = near.centroid if not near.is_empty else shapes[k].centroid
-        foot = np.array(line.interpolate(line.project(place)).coords[0])
-        ends = foot - _INTO * normals[wall], foot + (gap + _INTO) * normals[wall]
+        foot, tip = shapely.get_coordinates(shapely.shortest_line(line, shapes[k]))
+        if near.is_empty or (tip - foot) @ normals[wall] < 0.5 * gap:  # beside it, or behind it
+            into = _INTO * (tip - foot) / max(gap, 1e-9)
+            ends = foot - into, tip + into
+        else:
+            foot = np.array(line.interpolate(line.project(near.centroid)).coords[0])
+            ends = foot - _INTO * normals[wall], foot + (gap + _INTO) * normals[wall]
         z = min(max(height[k], layout.floor_height + 0.05), layout.ceiling_height - 0.05)
         segments.append([[*end, z] for end in ends])
     return np.array(segments).reshape(-1, 2, 3)

@@ -1,6 +1,7 @@
 """A light canvas for moving pictures: smooth lines, polygons, hatching and text with Pillow."""
 
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib as mpl
@@ -15,6 +16,8 @@ _FINE = 3
 """Sub-pixels in a row of each pixel."""
 _HATCH = 7
 """Pixels between the lines of hatching."""
+_DASH, _PAUSE = 4.0, 2.5
+"""Pixels of the parts of dashed lines."""
 Point = Float[np.ndarray, " 2"]
 
 
@@ -53,6 +56,15 @@ class Canvas:
         self._draw.line(
             _flat(points), fill=colour, width=max(1, round(width * _FINE)), joint="curve"
         )
+
+    def dashes(self, points: Float[np.ndarray, "points 2"], colour: str, width: float) -> None:
+        """Draw a dashed line through points in pixels, each part from its own start."""
+        for start, end in pairwise(points):
+            length = float(np.linalg.norm(end - start))
+            along = (end - start) / max(length, 1e-9)
+            for begin in np.arange(0.0, length, _DASH + _PAUSE):
+                stop = min(begin + _DASH, length)
+                self.line(np.stack([start + begin * along, start + stop * along]), colour, width)
 
     def contact(self, start: Point, end: Point, width: float) -> None:
         """Draw a short thick white line with a dark rim; a dot where start and end agree."""

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from panoscene.geometry import box_corners, direction_from_lonlat
+from panoscene.geometry import box_corners, direction_from_lonlat, polygon_turn
 from panoscene.scene import Scene
 from panoscene.views._cameras import FreeCamera, fitting_camera, free_lens
 from panoscene.views._model import build_model
@@ -42,7 +42,7 @@ def default_view(
     if not -90 <= look_down_deg <= 90:
         raise ValueError(f"look_down_deg: found {look_down_deg}, expected -90 to 90 degrees")
     points = _extent(scene)
-    lat, turn = -math.radians(look_down_deg), wall_angle(scene)
+    lat, turn = -math.radians(look_down_deg), -polygon_turn(scene.layout.floor_polygon)
     best, most = None, -1.0
     for lon in (np.arange(_AROUND) + 0.37) * (2 * math.pi / _AROUND):
         ahead = direction_from_lonlat(torch.tensor([lon, lat], dtype=torch.float64))
@@ -53,15 +53,6 @@ def default_view(
     if best is None:
         raise ValueError("size_px: found no camera for a picture of that size")
     return best
-
-
-def wall_angle(scene: Scene) -> float:
-    """Return the direction along most of the walls, from +x, within 45 degrees, in radians."""
-    polygon = scene.layout.floor_polygon.double().numpy(force=True)
-    wall = np.roll(polygon, -1, axis=0) - polygon
-    angle, length = np.arctan2(wall[:, 1], wall[:, 0]), np.hypot(wall[:, 0], wall[:, 1])
-    across, along = (length * np.sin(4 * angle)).sum(), (length * np.cos(4 * angle)).sum()
-    return float(np.arctan2(across, along) / 4)
 
 
 def _extent(scene: Scene) -> Float[np.ndarray, "points 3"]:

@@ -89,7 +89,8 @@ def draw_frame(stage: Stage, boxes: OrientedBoxes, number: int, title: str) -> I
     draw = ImageDraw.Draw(picture)
     draw.text((_MARGIN, HEADER / 2 + 2), title, fill=INK, font=font(18.0, bold=True), anchor="lm")
     count = len(pairs)
-    words = "no pair collides" if count == 0 else f"{count} collision" + "s" * (count > 1)
+    # from a centimetre, as hatched; certificates count collisions from ten
+    words = {0: "nothing overlaps", 1: "1 pair overlaps"}.get(count, f"{count} pairs overlap")
     place = (stage.size_px[0] - _MARGIN, HEADER / 2 + 2)
     draw.text(place, words, fill=ALARM if count else INK, font=font(18.0, bold=True), anchor="rm")
     _draw_curve(picture, stage, number)
@@ -126,7 +127,7 @@ def _draw_above(
             canvas.line(corners[k][[3, 2]], INK, 3.0)
     if stage.reference is not None:
         for ring in box_footprint(stage.reference).double().numpy(force=True):
-            canvas.line(page.pixels(ring)[[0, 1, 2, 3, 0]], REFERENCE, 1.3)
+            canvas.dashes(page.pixels(ring)[[0, 1, 2, 3, 0]], REFERENCE, 1.2)
     grown = floor.buffer(0.01 * page.scale, join_style="mitre")
     outside = [shape.difference(floor) for shape in shapes if not shape.within(grown)]
     shared = [
@@ -140,7 +141,7 @@ def _draw_above(
         wall_contacts(boxes, stage.scene.layout, stage.joints),
     ])  # fmt: skip
     for start, end in page.pixels(lines[..., :2]):
-        canvas.contact(start, end, 0.8 * CONTACT_WIDTH)
+        canvas.contact(start, end, 0.8 * CONTACT_WIDTH * _finer(stage))
     return canvas
 
 
@@ -166,9 +167,14 @@ def _draw_space(
     pixels, ahead = lens.pixels(lines)
     for (start, end), depth in zip(pixels, ahead, strict=True):
         if depth.min() > 0.1:
-            canvas.contact(start, end, 0.7 * CONTACT_WIDTH)
+            canvas.contact(start, end, 0.8 * CONTACT_WIDTH * _finer(stage))
     canvas.onto(picture, 0, 0)
     return picture
+
+
+def _finer(stage: Stage) -> float:
+    """Return the width of attachments as a share of the usual: they must not hide the furniture."""
+    return min(1.0, max(0.6, stage.size_px[0] / 1080))
 
 
 def _hull(
@@ -206,17 +212,17 @@ def _draw_key(
 ) -> None:
     """Draw what the signs mean."""
     middle = FOOTER / 2
-    rows: Sequence[tuple[str, float]] = (("collision", 130.0), ("attachment", 140.0))
+    rows: Sequence[tuple[str, float]] = (("overlap", 115.0), ("attachment", 140.0))
     if stage.reference is not None:
         rows = (*rows, ("truth", 80.0))
     for name, wide in rows:
-        if name == "collision":
+        if name == "overlap":
             canvas.hatch([shapely.box(x, middle - 8, x + 24, middle + 8)])
         elif name == "attachment":
             canvas.contact(np.array([x + 4, middle]), np.array([x + 22, middle]), 3.6)
         else:
-            canvas.line(np.array(shapely.box(x, middle - 7, x + 22, middle + 7).exterior.coords),
-                        REFERENCE, 1.3)  # fmt: skip
+            corners = np.array(shapely.box(x, middle - 7, x + 22, middle + 7).exterior.coords)
+            canvas.dashes(corners, REFERENCE, 1.2)
         place = (x + 32, height - FOOTER / 2)
         draw.text(place, name, fill=FAINT_INK, font=font(13.0), anchor="lm")
         x += wide

@@ -221,7 +221,7 @@ class _Ground:
             60.0 * _cover(rectangles, others, reach)
             + 60.0 * _cover(rectangles, own, reach)
             + 120.0 * _cover(rectangles, self._walls, reach)
-            + 60.0 * _cover(rectangles, self._marks, reach)
+            + 160.0 * _cover(rectangles, self._marks, reach)
             + 0.6 * _length(lines, others, reach)
             + 150.0 * (_length(lines, labels, reach) > 0)
             + 150.0 * _meets(lines, web, reach)

@@ -4,11 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from panoscene.geometry import polygon_turn
 from panoscene.scene import Scene
 from panoscene.views._far import far_objects
 from panoscene.views._key import longest_key
 from panoscene.views._labels import Label
-from panoscene.views._pieces import Bounds, Plan, View, make_plan, room_turn, scene_bounds
+from panoscene.views._pieces import Bounds, Plan, View, make_plan, scene_bounds
 
 KEY_WIDTH = 256.0
 HEADER, FOOTER = 74.0, 54.0
@@ -91,7 +92,7 @@ def fit_rooms(scenes: Sequence[Scene], free: tuple[float, float]) -> tuple[float
     +y points up as far as the walls allow, unless another quarter turn makes the room clearly
     larger.
     """
-    upright = room_turn(scenes[0])
+    upright = polygon_turn(scenes[0].layout.floor_polygon)
     options = []
     for turn in (upright, upright - math.copysign(math.pi / 2, upright)):
         low_x, low_y, high_x, high_y = bounds = scene_bounds(scenes, turn)

@@ -105,16 +105,6 @@ class Plan:
     """Width of marks, as a share of the usual, so that they do not cover plans of small scale."""
 
 
-def room_turn(scene: Scene) -> float:
-    """Return the smallest turn in radians that lays most of the wall along the page's edges."""
-    polygon = scene.layout.floor_polygon.double().numpy(force=True)
-    wall = np.roll(polygon, -1, axis=0) - polygon
-    angle = np.arctan2(wall[:, 1], wall[:, 0])
-    length = np.hypot(wall[:, 0], wall[:, 1])
-    across, along = (length * np.sin(4 * angle)).sum(), (length * np.cos(4 * angle)).sum()
-    return float(-np.arctan2(across, along) / 4)
-
-
 def scene_bounds(scenes: Sequence[Scene], turn: float) -> Bounds:
     """Return left, bottom, right, top in metres of rooms and objects in the turned world.
 
@@ -272,6 +262,9 @@ def _wall_contact(
     wall = shapely.LineString([start, end])
     gap = footprint.distance(wall)
     touching = footprint.intersection(wall.buffer(gap + 3.0, cap_style="flat"))
-    place = touching.centroid if not touching.is_empty else footprint.centroid
-    foot = np.array(wall.interpolate(wall.project(place)).coords[0])
+    foot, tip = shapely.get_coordinates(shapely.shortest_line(wall, footprint))
+    if touching.is_empty or (tip - foot) @ normal < 0.5 * gap:  # beside the wall, or behind it
+        direction = (tip - foot) / max(gap, 1e-9)
+        return Contact(foot - 5.0 * direction, tip + 5.0 * direction)
+    foot = np.array(wall.interpolate(wall.project(touching.centroid)).coords[0])
     return Contact(foot - 5.0 * normal, foot + (gap + 7.0) * normal)

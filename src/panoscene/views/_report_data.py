@@ -12,6 +12,7 @@ from panoscene.geometry import (
     OrientedBoxes,
     box_footprint,
     penetration_depth,
+    polygon_turn,
     signed_distance_to_polygon,
 )
 from panoscene.scene import (
@@ -25,7 +26,7 @@ from panoscene.scene import (
     room_surfaces,
 )
 from panoscene.style import GROUP_COLOURS, NO_FRONT, WALL_THICKNESS, group_of, words
-from panoscene.views._pieces import TOLERANCE, room_turn
+from panoscene.views._pieces import TOLERANCE
 from panoscene.views._report_colours import PALETTES, category_colour
 
 Values = dict[str, object]
@@ -124,7 +125,7 @@ def _layout(scene: Scene) -> Values:
         "floor": layout.floor_height,
         "ceiling": layout.ceiling_height,
         "triangles": floor.faces.tolist(),
-        "turn": room_turn(scene),
+        "turn": polygon_turn(scene.layout.floor_polygon),
         "wall_thickness": WALL_THICKNESS,
     }
 

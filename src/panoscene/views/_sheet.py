@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 from torch import Tensor
 
 from panoscene.scene import CATEGORIES, Scene
@@ -14,6 +14,7 @@ from panoscene.style import (
     FAINT_INK,
     GROUP_COLOURS,
     INK,
+    LEADER,
     MARGIN,
     OPAQUE,
     REFERENCE,
@@ -27,20 +28,23 @@ from panoscene.views._overlay import overlay_page
 from panoscene.views._page import Page
 from panoscene.views._panels import LARGEST
 from panoscene.views._sheet_grid import (
-    GAP,
     HEADING_ROW,
     HEADINGS,
     LEAST_WIDTH,
-    NAMES,
+    LONGEST,
+    NAME_ROW,
     ROOM_GAP,
-    TITLE_ROW,
     USUAL_WIDTH,
     Column,
     Grid,
     SheetRow,
     make_grid,
     rooms_of,
+    row_contents,
 )
+
+SMALLEST = 0.9
+"""Type of headings and captions, as a share of the body's: 9 points at 900 pixels of width."""
 
 
 def draw_sheet(
@@ -52,11 +56,11 @@ def draw_sheet(
     labels: bool = False,
     width_px: int = USUAL_WIDTH,
 ) -> None:
-    """Write a PNG that compares scenes: a row for each, in columns input, above, overlay, render.
+    """Write a PNG that compares scenes: a row for each, with input, above, overlay, render, view.
 
-    Columns without any content are left out. A photo that one of the methods of a room has, and
-    no other row, stands beside all of them. Rooms of equal heading are drawn at one scale from
-    above, and over the same photo.
+    Pictures that no row has are left out; what does not fit into one line at a legible size takes
+    two, in every row alike. Rows of a room without a photo get that of the first that has one.
+    Rooms of equal heading are drawn at one scale from above.
 
     Args:
         rows: from the top down; rows of one room next to each other.
@@ -74,10 +78,10 @@ def draw_sheet(
     """
     _check(rows, width_px)
     grid = make_grid(rows, title, width_px)
-    if grid.height > LARGEST:
+    if grid.height > LONGEST:
         raise ValueError(f"rows: found {len(rows)}, too many for a sheet {width_px} pixels wide")
     page = Page(grid.width, grid.height)
-    _draw_headings(page, grid, title)
+    _write_title(page, grid, title)
     for first, group in rooms_of(rows):
         _draw_room_heading(page, grid, group[0].room, grid.tops[first])
         _draw_group(page, grid, group, grid.tops[first:], reference, labels=labels)
@@ -97,34 +101,24 @@ def _check(rows: Sequence[SheetRow], width_px: int) -> None:
         )
 
 
-def _draw_headings(page: Page, grid: Grid, title: str) -> None:
+def _write_title(page: Page, grid: Grid, title: str) -> None:
+    if not title:
+        return
     unit, margin = grid.unit, MARGIN * grid.unit
-    top = grid.height - margin
-    if title:
-        size = TITLE * unit
-        text = page.fitted(title, size, grid.width - 2 * margin, bold=True)
-        page.text(margin, top - 0.5 * size, text, size=size, bold=True)
-        top -= TITLE_ROW * unit
-    for column, (left, width) in grid.columns.items():
-        page.text(
-            left + width / 2,
-            top - 0.4 * HEADING_ROW * unit,
-            HEADINGS[column],
-            size=BODY * unit,
-            colour=FAINT_INK,
-            align="center",
-        )
+    size = TITLE * unit
+    text = page.fitted(title, size, grid.width - 2 * margin, bold=True)
+    page.text(margin, grid.height - margin - 0.5 * size, text, size=size, bold=True)
 
 
 def _draw_room_heading(page: Page, grid: Grid, room: str, top: int) -> None:
     if not room:
         return
     unit, margin = grid.unit, MARGIN * grid.unit
-    y = grid.height - top + 0.45 * ROOM_GAP * unit
+    y = grid.height - top + 0.5 * ROOM_GAP * unit
     size = 1.1 * BODY * unit
     page.text(margin, y, room, size=size, bold=True)
     start = margin + page.text_size(room, size, bold=True)[0] + 12 * unit
-    page.line([(start, y), (grid.width - margin, y)], colour=GROUP_COLOURS["doors and windows"])
+    page.line([(start, y), (grid.width - margin, y)], colour=LEADER, width=0.6 * unit)
 
 
 def _draw_group(
@@ -137,33 +131,26 @@ def _draw_group(
     labels: bool,
 ) -> None:
     """Draw the rows of one room."""
-    images = [row.image for row in group if row.image is not None]
+    photo = next((row.image for row in group if row.image is not None), None)
     scenes = [row.scene for row in group if row.scene is not None]
     for row, top in zip(group, tops, strict=False):
         _write_name(page, grid, row, top)
-        if row.image is not None:
-            # one photo for all methods stands in their middle; a row of its own keeps it
-            shared = len(images) == 1 and row.scene is not None
-            middle = (tops[0] + tops[len(group) - 1]) / 2 if shared else top
-            _lay(page, grid, "input", _picture(grid, "input", row.image), round(middle))
+        image = row.image if row.image is not None else photo
+        pictures: dict[Column, Tensor | None] = {
+            "input": image, "rendering": row.rendering, "view": row.view,
+        }  # fmt: skip
+        for column in row_contents(row, group):
+            picture = pictures.get(column)
+            if picture is not None:
+                cell = grid.cells[column]
+                _lay(page, grid, column, framed(picture, cell.width, cell.height), top)
         if row.scene is not None:
-            image = row.image if row.image is not None else (images[0] if images else None)
-            width = grid.columns["room"][1]
-            above = room_cell(row.scene, scenes, width, grid.cell_height, reference=reference)
+            cell = grid.cells["room"]
+            above = room_cell(row.scene, scenes, cell.width, cell.height, reference=reference)
             _lay(page, grid, "room", above, top)
-            width = grid.columns["overlay"][1]
-            overlay = overlay_page(row.scene, width, image=image, labels=labels).pixels()
+            wide = grid.cells["overlay"].width
+            overlay = overlay_page(row.scene, wide, image=image, labels=labels).pixels()
             _lay(page, grid, "overlay", overlay, top)
-        if row.rendering is not None:
-            _lay(page, grid, "rendering", _picture(grid, "rendering", row.rendering), top)
-        if row.view is not None:
-            _lay(page, grid, "view", _picture(grid, "view", row.view), top)
-
-
-def _picture(
-    grid: Grid, column: Column, image: Float[Tensor, "3 height width"]
-) -> UInt8[np.ndarray, "shown_height shown_width 3"]:
-    return framed(image, grid.columns[column][1], grid.cell_height)
 
 
 def _lay(
@@ -173,38 +160,26 @@ def _lay(
     pixels: UInt8[np.ndarray, "height width 3"],
     top: int,
 ) -> None:
-    """Lay a picture into the middle of a cell."""
-    left, width = grid.columns[column]
-    height = pixels.shape[0]
-    x = left + (width - pixels.shape[1]) // 2
-    page.image(pixels, x, grid.height - top - (grid.cell_height + height) // 2)
+    """Lay a picture into the middle of its cell, below the cell's heading."""
+    cell = grid.cells[column]
+    height, width = pixels.shape[:2]
+    x = cell.left + (cell.width - width) // 2
+    page.image(pixels, x, grid.height - top - cell.down - (cell.height + height) // 2)
+    size = SMALLEST * BODY * grid.unit
+    y = grid.height - top - cell.down + 0.5 * HEADING_ROW * grid.unit
+    page.text(float(cell.left), y, HEADINGS[column], size=size, colour=FAINT_INK)
 
 
 def _write_name(page: Page, grid: Grid, row: SheetRow, top: int) -> None:
-    """Write the name of a row, and below it the caption in lines that fit."""
-    unit = grid.unit
-    x, width = MARGIN * unit, (NAMES - GAP) * unit
-    size, small = BODY * unit, 0.8 * BODY * unit
-    lines = _wrapped(page, row.caption, small, width)
-    middle = grid.height - top - grid.cell_height / 2
-    y = middle + (len(lines) * 1.3 * small) / 2
-    page.text(x, y, page.fitted(row.name, size, width, bold=True), size=size, bold=True)
-    y -= 0.35 * size
-    for line in lines:
-        y -= 1.3 * small
-        page.text(x, y, line, size=small, colour=FAINT_INK)
-
-
-def _wrapped(page: Page, text: str, size: float, width: float) -> list[str]:
-    """Return the words of a text in lines of this width; words that are wider are cut."""
-    lines: list[str] = []
-    for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and page.text_size(longer, size)[0] <= width:
-            lines[-1] = longer
-        else:
-            lines.append(page.fitted(word, size, width))
-    return lines
+    """Write the name of a row, and beside it the caption."""
+    unit, margin = grid.unit, MARGIN * grid.unit
+    size, small = 1.1 * BODY * unit, SMALLEST * BODY * unit
+    y, free = grid.height - top - 0.5 * NAME_ROW * unit, grid.width - 2 * margin
+    name = page.fitted(row.name, size, free if not row.caption else 0.5 * free, bold=True)
+    page.text(margin, y, name, size=size, bold=True)
+    taken = page.text_size(name, size, bold=True)[0] + 14 * unit
+    caption = page.fitted(row.caption, small, free - taken)
+    page.text(margin + taken, y, caption, size=small, colour=FAINT_INK)
 
 
 def _draw_key(page: Page, grid: Grid, rows: Sequence[SheetRow], *, with_reference: bool) -> None:
@@ -216,7 +191,7 @@ def _draw_key(page: Page, grid: Grid, rows: Sequence[SheetRow], *, with_referenc
     marks = [group for group in GROUP_COLOURS if group in shown]
     marks += ["collides, or outside", *(["true place"] if with_reference else [])]
     unit = grid.unit
-    size = 0.85 * BODY * unit
+    size = SMALLEST * BODY * unit
     widths = [page.text_size(mark, size)[0] + 52 * unit for mark in marks]
     shrink = min(1.0, (grid.width - 2 * MARGIN * unit) / sum(widths))
     x, y = MARGIN * unit, MARGIN * unit
