@@ -98,11 +98,20 @@ def test_an_open_leaf_hangs_on_its_hinge_and_stands_in_the_room(
     assert abs(np.arctan2(far[1], abs(far[0])) - swing) < 0.12
 
 
-@pytest.mark.xfail(
-    reason="leaf_pose mirrors: its right is against the wall's direction", strict=True
-)
-def test_an_open_leaf_is_not_mirrored() -> None:
-    leaf = door_leaf(make_model("door", 0, 0))
+@pytest.mark.parametrize("at_start", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_an_open_leaf_is_not_mirrored_and_hangs_on_the_side_without_handles(
+    seed: int, at_start: bool
+) -> None:
+    leaf = door_leaf(make_model("door", seed, 0))
     assert leaf is not None
-    opening = Opening(kind="door", room=0, wall=0, start=1.0, width=0.9, bottom=0.0, top=2.05)
-    assert np.linalg.det(leaf_pose(home_with(opening), opening, leaf)[:3, :3]) > 0
+    opening = Opening("door", 0, 0, 1.0, 0.9, 0.0, 2.05, swing=1.2, hinge_at_start=at_start)
+    home = home_with(opening)
+    pose = leaf_pose(home, opening, leaf)
+    assert np.linalg.det(pose[:3, :3]) > 0
+    polygon = home.rooms[0].polygon
+    along = (polygon[1] - polygon[0]) / np.linalg.norm(polygon[1] - polygon[0])
+    hinge = polygon[0] + along * (opening.start + (0.0 if at_start else opening.width))
+    out = np.abs(leaf.vertices[:, 1])
+    handles = leaf.vertices[out > 0.9 * out.max()] @ pose[:3, :3].T + pose[:3, 3]
+    assert np.linalg.norm(handles[:, :2] - hinge, axis=1).min() > 0.5

@@ -15,3 +15,7 @@ class DatasetError(ValueError):
         self.file = os.fspath(file)
         self.reason = reason
         super().__init__(f"{self.file}: {reason}")
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        """Let worker processes hand the error on."""
+        return type(self), (self.file, self.reason)

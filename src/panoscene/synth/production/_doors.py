@@ -51,7 +51,7 @@ def leaf_pose(home: Home, opening: Opening, leaf: CadModel) -> Float64[np.ndarra
     """Return world_from_object of a leaf that hangs in a doorway and stands open.
 
     The leaf is stretched to the clear width and height. Its hinge is at the jamb that the opening
-    says; it turns into the room that the opening belongs to.
+    says and its handles are on the other side; it turns into the room that the opening belongs to.
     """
     polygon = home.rooms[opening.room].polygon
     start = polygon[opening.wall]
@@ -61,8 +61,10 @@ def leaf_pose(home: Home, opening: Opening, leaf: CadModel) -> Float64[np.ndarra
     clear = opening.width - _GAP[0]
     height = opening.top - opening.bottom - _GAP[1]
     scale = np.array([clear / leaf.size[0], 1.0, height / leaf.size[2]])
-    # seen from the room the model's right, its +x, is against the wall's direction
-    right = -along
+    # seen from the room, where the model's front is, its right runs with the wall
+    hinge_side = -1.0 if opening.hinge_at_start else 1.0
+    facing = -1.0 if _handle_side(leaf) == hinge_side else 1.0
+    right, front = facing * along, facing * inward
     middle = start + along * (opening.start + opening.width / 2)
     middle = middle - inward * (_BEHIND + leaf.size[1] / 2)
     end = 0.0 if opening.hinge_at_start else opening.width
@@ -72,11 +74,18 @@ def leaf_pose(home: Home, opening: Opening, leaf: CadModel) -> Float64[np.ndarra
     turn = np.array([[cos, -sin], [sin, cos]])
     matrix = np.eye(4)
     matrix[:2, 0] = turn @ right * scale[0]
-    matrix[:2, 1] = turn @ inward * scale[1]
+    matrix[:2, 1] = turn @ front * scale[1]
     matrix[2, 2] = scale[2]
     matrix[:2, 3] = hinge + turn @ (middle - hinge)
     matrix[2, 3] = opening.bottom + _GAP[1] / 2 + height / 2
     return matrix
+
+
+def _handle_side(leaf: CadModel) -> float:
+    """Return 1 if the handles, which stand out most, are at the right of a leaf, else -1."""
+    out = np.abs(leaf.vertices[:, 1])
+    handles = leaf.vertices[out > 0.9 * out.max(initial=0.0), 0]
+    return 1.0 if float(handles.mean()) > 0.0 else -1.0
 
 
 def _pieces(model: CadModel) -> np.ndarray:

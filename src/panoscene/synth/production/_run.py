@@ -1,7 +1,9 @@
 """Renders what is left of a data set, with several processes."""
 
 import multiprocessing
+import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -95,7 +97,7 @@ def render_dataset(
         finished = ((task, _result(lambda task=task: render_home(task))) for task in tasks)
         return follow(Path(root), finished, progress, told)
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, context, initializer=_ignore_interrupt) as pool:
+    with ProcessPoolExecutor(processes, context, initializer=_begin_worker) as pool:
         return follow(Path(root), _in_order(pool, tasks, 2 * processes), progress, told)
 
 
@@ -190,6 +192,14 @@ def _result(call: Callable[[], None]) -> str | None:
     return None
 
 
-def _ignore_interrupt() -> None:
-    """Let the parent process decide what Ctrl-C means."""
+def _begin_worker() -> None:
+    """Let the parent process decide what Ctrl-C means, and end when it is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(2.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
