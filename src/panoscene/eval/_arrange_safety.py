@@ -110,8 +110,9 @@ def safety_table(result: dict[str, object]) -> str:
     outcomes = result["outcomes"]
     if not isinstance(outcomes, dict):
         raise TypeError(f"result: found outcomes {outcomes!r}, expected counts by name")
-    listed = ", ".join(f"{count} {name}" for name, count in sorted(outcomes.items()))
+    often = sorted(outcomes.items(), key=lambda item: (-item[1], item[0]))
+    listed = "; ".join(f"{name}: {count}" for name, count in often)
     return (
         f"Of {result['scenes']} scenes without any sense, {result['worse']} came out worse or not "
-        f"finite. What was done: {listed}."
+        f"finite. Outcomes: {listed}."
     )
