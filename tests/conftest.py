@@ -1,9 +1,10 @@
 """What every test shares: one thread a worker, quiet plots, modest property tests, a browser.
 
 With the environment variable PANOSCENE_MUST_RUN, such as "browser npm", tests that need these fail
-where they would be skipped.
+where they would be skipped; with "renderer" in it all optional packages must be there.
 """
 
+import importlib.util
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -46,6 +47,17 @@ BROWSER_FLAGS = [
 ]
 PATIENCE = 90_000
 """Milliseconds; busy machines draw 3D slowly without a graphics card."""
+
+
+OPTIONAL = ("mitsuba", "mitsuba_oidn", "drjit", "mujoco", "fast_simplification", "skimage", "ray")
+"""Packages without which tests of data sets are skipped."""
+
+
+def pytest_configure() -> None:
+    """Refuse to start where tests would be skipped that may not be."""
+    absent = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
+    if absent and "renderer" in os.environ.get("PANOSCENE_MUST_RUN", "").split():
+        raise pytest.UsageError(f"PANOSCENE_MUST_RUN names the renderer: {absent} not installed")
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panoscene.scene import CATEGORIES
-from panoscene.style import FLOOR, GROUP_COLOURS, GROUPS, INK, OPAQUE, group_of, words
+from panoscene.style import FLOOR, GROUP_COLOURS, GROUPS, INK, OPAQUE, group_of, label_fill, words
 
 # Full colour-vision deficiencies in linear RGB (Machado, Oliveira, Fernandes 2009).
 VISION = {
@@ -69,3 +69,10 @@ def test_text_is_readable_on_every_fill() -> None:
     for colour in GROUP_COLOURS.values():
         fill = XYZ[1] @ (OPAQUE * linear(colour) + (1 - OPAQUE) * linear(FLOOR))
         assert (fill + 0.05) / (ink + 0.05) > 4.5, "contrast of WCAG level AA"
+
+
+def test_text_is_readable_on_every_label() -> None:
+    ink = XYZ[1] @ linear(INK)
+    for colour in (*GROUP_COLOURS.values(), "#202020"):
+        assert (XYZ[1] @ linear(label_fill(colour)) + 0.05) / (ink + 0.05) > 4.5
+    assert label_fill(GROUP_COLOURS["tables"]) == GROUP_COLOURS["tables"]

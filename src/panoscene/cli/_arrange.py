@@ -1,5 +1,6 @@
 """Scene files in batches: repaired, certified, drawn."""
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,6 +83,8 @@ class _Result:
     scene: Scene | None = None
     certificate: Certificate | None = None
     arranged: Scene | None = None
+    seconds: float = 0.0
+    """Of the batch that the scene was arranged in."""
     error: str = ""
 
 
@@ -115,6 +118,7 @@ def batches(scenes: Sequence[tuple[Path, Scene]]) -> Iterator[list[tuple[Path, S
 def _solved(
     batch: Sequence[tuple[Path, Scene]], settings: ArrangementSettings
 ) -> Iterator[_Result]:
+    start = time.perf_counter()
     try:
         with blaming(batch[0][0]):
             arrangements = arrange_scenes([s for _, s in batch], settings)
@@ -126,8 +130,9 @@ def _solved(
         for item in batch:
             yield from _solved([item], settings)
         return
+    seconds = time.perf_counter() - start
     for (file, scene), found in zip(batch, arrangements, strict=True):
-        yield _Result(file, scene, found.certificate, found.scene)
+        yield _Result(file, scene, found.certificate, found.scene, seconds)
 
 
 def _written(
@@ -180,6 +185,7 @@ def _draw(result: _Result, target: Path, settings: ArrangementSettings, extras: 
                 image_caption="" if photo is not None else "Rendered from the boxes.",
                 before=before,
                 certificate=certificate,
+                timings={"arrangement": result.seconds},
             )
     if extras.animation:
         path = beside(target, ANIMATION)

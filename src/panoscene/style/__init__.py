@@ -30,4 +30,5 @@ from panoscene.style._style import TITLE as TITLE
 from panoscene.style._style import WALL as WALL
 from panoscene.style._style import WALL_THICKNESS as WALL_THICKNESS
 from panoscene.style._style import group_of as group_of
+from panoscene.style._style import label_fill as label_fill
 from panoscene.style._style import words as words

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.scene import CATEGORIES, Scene
-from panoscene.style import ALARM, GROUP_COLOURS, INK, PAPER, group_of, words
+from panoscene.style import ALARM, GROUP_COLOURS, INK, PAPER, group_of, label_fill, words
 from panoscene.views._curves import Curve, overlay_curves
 from panoscene.views._overlay_labels import Placed, Target, place_labels
 from panoscene.views._page import Page
@@ -190,7 +190,7 @@ def _draw_plate(
     page.plate(
         (label.u, page.height - label.v),
         size,
-        fill=GROUP_COLOURS[group],
+        fill=label_fill(GROUP_COLOURS[group]),
         edge=ALARM if red else INK,
         width=0.12 * size[1] if red else 0.06 * size[1],
     )
