@@ -10,7 +10,8 @@ import shapely
 import torch
 from PIL import Image
 
-from panoscene.scene import Objects, Scene
+from panoscene.geometry import OrientedBoxes
+from panoscene.scene import Objects, Scene, category_index, objects_from_boxes, scene_from_boxes
 from panoscene.style import ALARM
 from panoscene.synth import PerturbNoise, perturb_scene, sample_room
 from panoscene.views import draw_birds_eye, draw_comparison
@@ -211,3 +212,22 @@ def test_contacts_join_the_wall_and_the_object(
         assert contact.start[0] == pytest.approx(start[0], abs=1)
     assert shapely.LineString([contact.start, contact.end]).intersects(box)
     assert contact.end[1] == pytest.approx(end[1], abs=4)
+
+
+def test_doors_and_windows_are_at_home_in_walls(tmp_path: Path) -> None:
+    """The same box behind the wall is red as a chest and not as a window."""
+    scene = room(2, 1)
+    layout = scene.layout
+    start, end = layout.floor_polygon[0], layout.floor_polygon[1]
+    along = (end - start) / (end - start).norm()
+    outward = torch.stack([along[1], -along[0]])
+    middle = (start + end) / 2 + 0.1 * outward
+    yaw = torch.atan2(along[1], along[0])
+    boxes = OrientedBoxes(
+        torch.cat([middle, torch.tensor([1.2])])[None], torch.tensor([[0.8, 0.2, 1.0]]), yaw[None]
+    )
+    for category, marked in (("window", False), ("chest", True)):
+        objects = objects_from_boxes(boxes, torch.tensor([category_index(category)]))
+        file = tmp_path / f"{category}.png"
+        draw_birds_eye(scene_from_boxes(objects, layout), file)
+        assert (red(file, 900) > 20) is marked

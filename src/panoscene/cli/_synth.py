@@ -141,7 +141,7 @@ def _say_checks(found: Mapping[str, Any]) -> None:
     more = len(found["problems"]) - SHOWN
     if more > 0:
         say(f"and {more} more: --json has them")
-    verdict = f"{found['failures']} failures" if found["failures"] else "all is right"
+    verdict = f"{found['failures']} failure{'s' * (found['failures'] != 1)}" if found["failures"] else "all is right"
     say(f"{found['panoramas']} panoramas: {verdict}")
 
 

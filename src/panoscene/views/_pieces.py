@@ -17,6 +17,10 @@ TOLERANCE = 0.01
 FAR = 2.0
 """Metres outside the room from which an object may lie outside the picture, and length from which
 no line is drawn between two that should touch: it would cross what has nothing to do with it."""
+IN_WALL = 0.5
+"""Metres behind the surface of a wall in which doors and windows are at home."""
+BUILT_IN = ("door", "window")
+"""Categories that stand in walls."""
 Bounds = tuple[float, float, float, float]
 
 
@@ -141,17 +145,21 @@ def make_plan(scene: Scene, view: View, *, relations: bool) -> Plan:
     pairs = colliding_pairs(boxes)
     colliding = set(pairs.flatten().tolist())
     grown = floor.buffer(TOLERANCE * view.scale, join_style="mitre")
+    with_walls = floor.buffer(IN_WALL * view.scale, join_style="mitre")
+    categories = [CATEGORIES[k] for k in scene.objects.category.tolist()]
     bottom = (boxes.centre[:, 2] - boxes.size[:, 2] / 2 - scene.layout.floor_height).tolist()
     top = (boxes.centre[:, 2] + boxes.size[:, 2] / 2).tolist()
     pieces = [
         Piece(
             index=index,
-            category=CATEGORIES[int(scene.objects.category[index])],
+            category=categories[index],
             footprint=footprint,
             front=corners[index, [3, 2]],
             overhead=bottom[index] > OVERHEAD,
             colliding=index in colliding,
-            outside=_outside(footprint, floor, grown),
+            outside=_outside(
+                footprint, floor, with_walls if categories[index] in BUILT_IN else grown
+            ),
         )
         for index, footprint in enumerate(footprints)
     ]

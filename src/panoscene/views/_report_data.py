@@ -26,7 +26,7 @@ from panoscene.scene import (
     room_surfaces,
 )
 from panoscene.style import GROUP_COLOURS, NO_FRONT, WALL_THICKNESS, group_of, words
-from panoscene.views._pieces import TOLERANCE
+from panoscene.views._pieces import BUILT_IN, IN_WALL, TOLERANCE
 from panoscene.views._report_colours import PALETTES, category_colour
 
 Values = dict[str, object]
@@ -74,7 +74,8 @@ def report_data(
 def box_faults(scene: Scene, relations: Relations | None) -> list[str | None]:
     """Return what is physically wrong with each object, from one centimetre, or None.
 
-    Objects that do not belong in the room by their inside_room score may be outside it.
+    Objects that do not belong in the room by their inside_room score may be outside it, and doors
+    and windows in its walls.
     """
     boxes, names = scene.objects.boxes, object_names(scene.objects)
     if len(boxes) == 0:
@@ -84,6 +85,8 @@ def box_faults(scene: Scene, relations: Relations | None) -> list[str | None]:
     outside = _distance_outside(boxes, scene.layout)
     if relations is not None:
         outside = outside * (relations.inside_room >= 0.5)
+    built_in = [CATEGORIES[k] in BUILT_IN for k in scene.objects.category.tolist()]
+    outside = outside - IN_WALL * outside.new_tensor(built_in)
     faults: list[str | None] = []
     columns = zip(deepest.tolist(), partner.tolist(), outside.tolist(), strict=True)
     for overlap, other, beyond in columns:
