@@ -141,7 +141,8 @@ def _say_checks(found: Mapping[str, Any]) -> None:
     more = len(found["problems"]) - SHOWN
     if more > 0:
         say(f"and {more} more: --json has them")
-    verdict = f"{found['failures']} failure{'s' * (found['failures'] != 1)}" if found["failures"] else "all is right"
+    number = found["failures"]
+    verdict = f"{number} failure{'s' * (number != 1)}" if number else "all is right"
     say(f"{found['panoramas']} panoramas: {verdict}")
 
 

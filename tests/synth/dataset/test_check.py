@@ -134,9 +134,9 @@ def brighter_left(panorama: Loaded) -> Loaded:
 
 
 def torn_distance(panorama: Loaded) -> Loaded:
-    distance = panorama.distance.copy()
-    distance[:, : distance.shape[1] // 2] *= 1.05
-    return replace(panorama, distance=distance)
+    """Stretch the columns more and more, so that only the seam is torn."""
+    stretch = np.linspace(1.0, 1.05, panorama.distance.shape[1])
+    return replace(panorama, distance=panorama.distance * stretch)
 
 
 def torn_instances(panorama: Loaded) -> Loaded:

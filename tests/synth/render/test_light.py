@@ -1,11 +1,14 @@
 """Lamps, the outside, the choice of lights and the development of pictures; numpy only."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from panoscene.synth.assets import Material
+from panoscene.synth.assets import LightSource, Material
+from panoscene.synth.models import make_model
 from panoscene.synth.render import (
     LIGHT_SHARES,
     LightKind,
@@ -14,7 +17,7 @@ from panoscene.synth.render import (
     sample_light,
 )
 from panoscene.synth.render._develop import develop, tone_curve, wrap_pad
-from panoscene.synth.render._lamps import LUMINANCE, lamps_of
+from panoscene.synth.render._lamps import LUMINANCE, _within, lamps_of
 from panoscene.synth.render._light_choice import alias_table, light_choice, room_grid
 from panoscene.synth.render._outside import outside_picture, sky_cells
 from panoscene.synth.render._paint import pack_paints
@@ -147,3 +150,11 @@ def test_paints_keep_colour_texture_and_flags():
     assert (texel >> 24) & 255 == 102
     assert paints.table[:, 6].tolist() == [0, 0, 1]
     assert paints.table[0, 7] == texel  # the mean of one texel
+
+
+def test_bulbs_are_inside_their_lamps() -> None:
+    lamp = make_model("floor_lamp", 0, 0)
+    top = lamp.size[2] / 2
+    for height, found in ((top + 0.06, top - 0.05), (top - 0.2, top - 0.2)):
+        bulb = LightSource((0.0, 0.0, height), 0.1)
+        assert _within(replace(lamp, lights=(bulb,)), bulb) == pytest.approx((0.0, 0.0, found))

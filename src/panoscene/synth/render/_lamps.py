@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from panoscene.synth.assets import CadModel, LightSource
 from panoscene.synth.render._records import LightSetting, PlacedModel, RenderScene
 
 _FLUX = {"floor": 950.0, "wall": 500.0, "on_top": 420.0, "in_wall": 400.0, "ceiling": 1500.0}
@@ -71,7 +72,7 @@ def lamps_of(scene: RenderScene, light: LightSetting) -> Lamps:
     owner = [k for k, placed in enumerate(scene.placed) for _ in placed.model.lights]
     sources = [(p, source) for p in scene.placed for source in p.model.lights]
     count = len(sources)
-    position = np.array([_world(p, s.position) for p, s in sources]).reshape(count, 3)
+    position = np.array([_world(p, _within(p.model, s)) for p, s in sources]).reshape(count, 3)
     radius = np.array([np.clip(s.diameter / 2, 0.02, 0.3) for _, s in sources])
     room = np.array([p.room for p, _ in sources], dtype=np.int64)
     share = np.array([_FLUX[p.model.placement] / len(p.model.lights) ** 0.7 for p, _ in sources])
@@ -87,6 +88,20 @@ def lamps_of(scene: RenderScene, light: LightSetting) -> Lamps:
     index = np.array(owner, dtype=np.int64)
     kelvin = np.where(mixed[index], own[index], of_room[room]) if count else np.zeros(0)
     return Lamps(position, radius, flux, colour_of_kelvin(kelvin), room, index)
+
+
+def _within(model: CadModel, source: LightSource) -> tuple[float, float, float]:
+    """Return where a bulb is: catalogues have some that hang in the air above their lamp."""
+    place = np.array(source.position)
+    reach = np.maximum(np.array(model.size) / 2 - source.diameter / 2, 0.0)
+    if (np.abs(place) - reach).max() > _STICKS_OUT:
+        place = place.clip(-reach, reach)
+    x, y, z = place.tolist()
+    return x, y, z
+
+
+_STICKS_OUT = 0.02
+"""Metres by which bulbs may reach out of the box around their model."""
 
 
 def _switched_on(
