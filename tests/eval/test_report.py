@@ -38,6 +38,28 @@ def scores(method: str, fov_deg: int = 360, **metrics: float) -> ScoreFile:
     )
 
 
+def simulated(method: str, **metrics: float) -> ScoreFile:
+    """Return a row as of our own export: on sampled rooms, the input under its own name."""
+    kind = {"estimates": "input", "truth": "oracle"}.get(method, "ours")
+    return scores(method, 360, **metrics).model_copy(
+        update={"data": "sampled rooms, seed 7", "kind": kind}
+    )
+
+
+def true(score: ScoreFile) -> ScoreFile:
+    return score.model_copy(update={"predictions_hash": score.targets_hash})
+
+
+def with_ap(score: ScoreFile, ap: float, **targets: float) -> ScoreFile:
+    """Return scores whose every category has the same AP, and 5 detections."""
+    row = {key: Measured(value=ap) for key in ("ap_15", "ap_25", "ap_50", "released_ap_15")}
+    rows = {
+        name: row | {"targets": Measured(value=count), "detections": Measured(value=5.0)}
+        for name, count in targets.items()
+    }
+    return score.model_copy(update={"categories": rows})
+
+
 def part(page: str, heading: str) -> str:
     return page.split(f"\n## {heading}\n")[1].split("\n## ", maxsplit=1)[0]
 
@@ -106,33 +128,34 @@ def test_methods_with_the_same_layout_share_a_row() -> None:
     assert "| `c` | regularised |" in table
 
 
-def test_a_truth_that_is_not_perfect_is_explained() -> None:
-    perfect = scores("truth", fidelity__touching_f1=1.0)
+def test_a_truth_that_is_not_perfect_is_explained_whatever_its_name() -> None:
+    perfect = true(scores("truth", fidelity__touching_f1=1.0))
     assert "Why" not in results_page([perfect])
-    flawed = scores("truth", fidelity__touching_f1=0.997, plausibility__paper_hitting_floor=0.14)
-    page = results_page([flawed])
+    short = {"fidelity__touching_f1": 0.997, "plausibility__paper_hitting_floor": 0.14}
+    page = results_page([true(scores("perfect", 360, **short))])
     assert "Why does the truth hit the floor 0.14 times" in part(page, "Physical plausibility")
     assert "Why is the truth not perfect (touching F1 99.7)?" in part(page, "Relations")
+    assert "piano" not in page
+    assert "piano" in results_page([simulated("estimates"), true(simulated("truth", **short))])
+    assert "Why" not in results_page([scores("truth", 360, **short)])
 
 
 def test_categories_of_what_was_given_stand_beside_ours() -> None:
-    def with_ap(method: str, ap: float) -> ScoreFile:
-        row = {key: Measured(value=ap) for key in ("ap_15", "ap_25", "ap_50", "released_ap_15")}
-        row |= {"targets": Measured(value=4.0), "detections": Measured(value=5.0)}
-        return scores(method).model_copy(update={"categories": {"laptop": row}})
-
-    table = part(results_page([with_ap("default", 0.5), with_ap("estimates", 0.25)]), "Categories")
+    ours, given = (with_ap(simulated(m), ap, laptop=4) for m, ap in
+                   (("default", 0.5), ("estimates", 0.25)))  # fmt: skip
+    table = part(results_page([given, ours]), "Categories")
+    assert "AP in percent of `default` and of `estimates`, that it starts from." in table
     line = "| `laptop` | 4 | 50.0 | 50.0 | 50.0 | 50.0 | 25.0 | 25.0 | 25.0 |"
     assert line in table
     assert "Thin objects fare worst (`laptop` 50.0)" in table
-    alone = part(results_page([with_ap("default", 0.5)]), "Categories")
+    alone = part(results_page([ours]), "Categories")
     assert "| `laptop` | 4 | 50.0 | 50.0 | 50.0 | 50.0 |" in alone
 
 
 def test_the_note_says_how_good_the_simulated_relations_are() -> None:
     rows = [
-        scores("estimates", relations__touching_f1=0.867),
-        scores("default-weak", relations__touching_f1=0.48),
+        simulated("estimates", relations__touching_f1=0.867),
+        simulated("default-weak", relations__touching_f1=0.48),
     ]
     note = summary_note(rows)
     assert "touching F1 is 86.7 %" in note
@@ -140,6 +163,83 @@ def test_the_note_says_how_good_the_simulated_relations_are() -> None:
     assert "touching F1 48.0 %" in note
     assert "`default-weak`" not in summary_note(rows[:1])
     assert note in results_page(rows)
+
+
+def test_anybodys_page_says_nothing_of_our_rooms() -> None:
+    """Methods and targets of somebody else, scored without intervals."""
+    net = with_ap(scores("net", detection__released_ap_15_mean_57=0.4), 0.5, laptop=4, sofa=2)
+    rows = [net, scores("net-quarters", 90)]
+    rows = [row.model_copy(update={"kind": "prediction", "replicates": 0}) for row in rows]
+    page = results_page(rows)
+    foreign = ("sampler", "sampled rooms", "no networks", "simulate", "eval export", "docs/")
+    foreign += ("Thin objects", "95 %", "0 bootstrap", "Repairing", "True boxes", "`estimates`")
+    assert {words for words in foreign if words in page} == set()
+    assert summary_note(rows) == ""
+    assert "There are no intervals" in page
+    assert "intervals are corrected" not in page
+    splits = part(page, "Field of view")
+    assert splits.index("| `net` | 360° |") < splits.index("| `net-quarters` | 90° |")
+    assert "AP in percent of `net`." in part(page, "Categories")
+    assert "| `sofa` | 2 | 50.0 | 50.0 | 50.0 | 50.0 |" in part(page, "Categories")
+    ours = simulated("estimates")
+    assert "**There are no networks yet.**" in results_page([ours])
+    beside = rows[0].model_copy(update={"data": ours.data})
+    page = results_page([ours, beside])
+    assert "no networks yet" not in page
+    assert "`estimates` simulates networks" in page
+    assert "10 bootstrap resamples of the scenes (none for `net`)" in page
+
+
+def test_a_split_stands_below_the_method_that_it_is_of() -> None:
+    rows = [scores("net"), scores("other"), scores("net-quarters", 90)]
+    table = part(results_page(rows), "Field of view")
+    assert "| `net` | 360° |" in table
+    assert "`other`" not in table
+    both = part(results_page([*rows[:2], scores("quarters", 90)]), "Field of view")
+    assert "| `net` | 360° |" in both
+    assert "| `other` | 360° |" in both
+
+
+def test_headings_say_how_many_categories_have_targets() -> None:
+    score = with_ap(simulated("estimates", detection__released_ap_15_mean_57=0.3), 0.5,
+                    sofa=2, bed=9, chair=40, cushion=0)  # fmt: skip
+    page = results_page([score])
+    detection = part(page, "Detection")
+    assert "AP 15, 57 cat. (3 with targets)" in part(page, "Summary")
+    assert "| AP 50, 57 cat. (3 with targets) |" in detection
+    assert "all 57 but the 54 without targets." in detection
+    assert "| released AP 15, 57 cat. |" in detection
+    assert "57 categories that are detected (4 here)" in detection
+    why = "1 of 3 categories have more detections than targets (1 of the 2 with fewer than 10"
+    assert why in detection
+    assert "1 without targets are detected and count 0." in detection
+    assert "Why" not in results_page([with_ap(scores("a"), 0.5, sofa=2)])
+
+
+def test_only_settings_that_lose_are_explained() -> None:
+    worse = [simulated("estimates"), simulated("released", detection__ap_15_mean_57=0.4)]
+    assert "Why is `released` worse" in part(results_page(worse), "Detection")
+    better = [simulated("estimates"), simulated("released", detection__ap_15_mean_57=0.6)]
+    assert "Why is `released` worse" not in results_page(better)
+
+
+def test_layouts_by_corners_have_a_table_and_missing_readings_a_reason() -> None:
+    start = "layout__raw__overall__scenes"
+    groups = {f"layout__regularised__6__{name}": value for name, value in
+              (("scenes", 3.0), ("iou_3d", 0.5), ("corner_error", 1.25))}  # fmt: skip
+    rows = [scores("a", 360, **{start: 2.0}, **groups), scores("b")]
+    layout = part(results_page(rows), "Layout")
+    assert "| regularised | 6 | 3 | 50.0 | - | 1.25 | - |" in layout
+    assert "The layout of `a` by the number of corners" in layout
+    assert "`b` have no `raw` row" in layout
+    assert "no `raw` row" not in part(results_page(rows[1:]), "Layout")
+
+
+def test_intervals_of_relations_are_shown() -> None:
+    wide = {"relations.under_ceiling_f1": Measured(value=0.485, low=0.408, high=0.553)}
+    score = scores("a")
+    score = score.model_copy(update={"metrics": score.metrics | wide})
+    assert "| 48.5 [40.8, 55.3] |" in part(results_page([score]), "Relations")
 
 
 def test_the_papers_rows_are_what_it_prints() -> None:
@@ -153,6 +253,17 @@ def test_the_papers_rows_are_what_it_prints() -> None:
     assert ours[:3] == ["Ours Full", "paper", "50.7"]
     assert len(ours) == 2 + len(SEMANTIC) == 16
     assert "-" not in ours
+
+
+def test_what_disagrees_in_the_paper_has_a_note() -> None:
+    page = results_page([scores("net"), scores("net-quarters", 90)])
+    fov = part(page, "Field of view")
+    assert "| Ours Full | 33.92 |" in fov
+    assert "33.92 in this table of the paper and 33.59 in its other tables" in fov
+    assert "lists 42 categories, and the mean over those is the 33.59" in page
+    printed = "The paper prints a mean of 31.4 for `PanoContext`, though its row averages 34.6."
+    assert printed in part(page, "Semantic segmentation")
+    assert page.count("though its row averages") == 1
 
 
 @pytest.mark.parametrize("fov_deg", [0, 361])

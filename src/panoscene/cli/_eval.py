@@ -93,6 +93,7 @@ def run_score(
                 replicates=replicates,
                 workers=workers or os.cpu_count() or 1,
                 progress=advance,
+                warn=_warn,
             )
             results.append(score)
             if output is not None:
@@ -105,6 +106,10 @@ def run_score(
     else:
         say(score_table(results, SUMMARY))
     return 0
+
+
+def _warn(text: str) -> None:
+    note(f"warning: {text}")
 
 
 def run_report(source: Path, output: Path, readme: Path | None, *, check: bool) -> int:

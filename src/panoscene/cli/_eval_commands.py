@@ -67,7 +67,8 @@ def score(
 
     Average precision (standard and the authors' definition), physical plausibility, relations,
     layout, semantic segmentation and, if asked for, shapes. Every target counts: one without a
-    prediction of the same file name is an empty room. For example:
+    prediction of the same file name is an empty room. What is not valid in a prediction counts as
+    not predicted, with a warning. For example:
 
         panoscene eval score runs/rooms -o results
         panoscene eval score my/predictions --targets my/truth --json

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from panoscene.eval._fov import FOV_DEG
 from panoscene.eval._published import (
     PAPER_ABLATION,
+    PAPER_AP_FULL,
     PAPER_COLLISIONS,
     PAPER_FOV_MAP_57,
     PAPER_MAP_57,
@@ -15,6 +16,9 @@ from panoscene.eval._published import (
 )
 from panoscene.eval._score_tables import Column, markdown_table
 from panoscene.scene import PANOCONTEXT_12
+
+_ROUNDING = 0.05
+"""By which the mean of printed numbers may differ from the printed mean, per cent."""
 
 
 def paper_relations_row(columns: Sequence[Column]) -> list[str]:
@@ -48,10 +52,41 @@ def paper_semantic_rows(columns: Sequence[Column]) -> list[list[str]]:
 def paper_fov_table() -> str:
     """Return the paper's experiment on the field of view."""
     rows = [
-        [method, *(f"{value:.1f}" for value in PAPER_FOV_MAP_57[method])]
+        [method, *(f"{value:.2f}" for value in PAPER_FOV_MAP_57[method])]
         for method in ("Ours w/o RO", "Ours Full")
     ]
     return markdown_table(["method", *(f"{fov}°" for fov in FOV_DEG)], rows)
+
+
+def paper_fov_note() -> str:
+    """Return why a method has two numbers in the paper, both as printed."""
+    here, there = PAPER_FOV_MAP_57["Ours Full"][0], PAPER_MAP_57["Ours Full"]
+    return (
+        f"`Ours Full` at {FOV_DEG[0]}° is {here:.2f} in this table of the paper and {there:.2f} in "
+        "its other tables; both are as printed."
+    )
+
+
+def paper_57_note() -> str:
+    """Return what the paper's 57 categories are."""
+    mean = sum(PAPER_AP_FULL.values()) / len(PAPER_AP_FULL)
+    return (
+        f"'57' stands in quotes because the paper's supplement lists {len(PAPER_AP_FULL)} "
+        f"categories, and the mean over those is the {mean:.2f} of `Ours Full`."
+    )
+
+
+def paper_semantic_note() -> str:
+    """Return which printed means are not those of their rows; empty if all are."""
+    parts: list[str] = []
+    for method, ious in PAPER_SEMANTIC_IOU.items():
+        mean, printed = sum(ious.values()) / len(ious), PAPER_SEMANTIC_MIOU[method]
+        if abs(mean - printed) > _ROUNDING:
+            parts.append(
+                f"The paper prints a mean of {printed:.1f} for `{method}`, though its row averages "
+                f"{mean:.1f}."
+            )
+    return " ".join(parts)
 
 
 def paper_counts_table() -> str:

@@ -3,17 +3,28 @@
 import re
 from collections.abc import Sequence
 
-from panoscene.eval._fov import FOV_DEG
-from panoscene.eval._layout_scores import CORNER_GROUPS
 from panoscene.eval._paper_rows import (
+    paper_57_note,
     paper_counts_table,
-    paper_fov_table,
     paper_relations_row,
+    paper_semantic_note,
     paper_semantic_rows,
 )
 from panoscene.eval._published import PAPER_ABLATION
+from panoscene.eval._report_facts import (
+    are_simulated,
+    categories_without_targets,
+    check_same_targets,
+    detected_categories,
+    lower_released_note,
+    row_named,
+    truth_row,
+    whole_rooms,
+)
+from panoscene.eval._report_tables import category_part, fov_part, layout_part
 from panoscene.eval._results import Measured, ScoreFile
 from panoscene.eval._score_tables import (
+    AP_15_57,
     DETECTION,
     END_TO_END,
     FIDELITY,
@@ -32,11 +43,12 @@ from panoscene.eval._score_tables import (
     markdown_table,
     measured_cell,
     score_table,
+    with_counts,
 )
+from panoscene.scene import CATEGORIES
 
-_WHOLE = FOV_DEG[0]
-_FLAT = ("laptop", "picture")
-"""Categories whose boxes are a few centimetres thin."""
+_FEW = 8
+"""Names that a sentence can bear."""
 
 
 def results_page(scores: Sequence[ScoreFile]) -> str:
@@ -52,25 +64,21 @@ def results_page(scores: Sequence[ScoreFile]) -> str:
         *_detection_part(whole),
         *_plausibility_part(whole),
         *_relations_part(whole),
-        "## Layout",
-        "IoU in percent, 3D by the number of corners of the true room; corner error in percent of "
-        "the image's diagonal, pixel error in percent of the pixels. `raw` is the polygon before "
-        "it is made rectangular. A room that is missing or not valid is `degenerate` and counts "
-        "at its worst. Repairing moves no walls, so methods share rows. `-`: no such room.",
-        _layout_table(whole),
+        *layout_part(whole),
         "## Semantic segmentation",
         "IoU in percent of the PanoContext protocol's 12 labels, on evenly spread directions. The "
-        "last rows are the paper's, on photos.",
+        f"last rows are the paper's, on photos. {paper_semantic_note()}".strip(),
         score_table(whole, SEMANTIC, beside=paper_semantic_rows(SEMANTIC)),
         *_meshes_part(whole),
-        *_fov_part(scores),
-        *_category_part(whole),
+        *fov_part(scores),
+        *category_part(whole),
         "## The paper's own numbers",
         "On the authors' data, which nobody else has, in their definition of AP. For orientation "
         "only: levels cannot be compared with the tables above.",
         paper_counts_table(),
+        paper_57_note(),
     ]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def summary_table(scores: Sequence[ScoreFile]) -> str:
@@ -80,52 +88,32 @@ def summary_table(scores: Sequence[ScoreFile]) -> str:
         ValueError: there are no scores, or they are of different targets.
     """
     check_same_targets(scores)
-    return score_table(whole_rooms(scores), SUMMARY)
+    return score_table(whole_rooms(scores), with_counts(SUMMARY, scores))
 
 
 def summary_note(scores: Sequence[ScoreFile]) -> str:
-    """Return what must be read with the short table: what the simulated input is good at."""
-    by_name = {score.method: score for score in scores}
-    facts = [
-        "The optimiser's weights were searched on other seeds of the sampler that these rooms "
-        "come from."
-    ]
+    """Return what must be read with the short table: what the simulated input is good at.
+
+    Empty when the scores are not those of our methods on sampled rooms.
+    """
+    given, weak = (row_named(scores, name) for name in ("estimates", "default-weak"))
+    if given is None:
+        return ""
     touching = Column("", "relations.touching_f1", 100.0, interval=False)
     paper = f"{100 * (PAPER_ABLATION['Full'].touching_f1 or 0):.0f} %"
-    if "estimates" in by_name:
-        found = column_cell(by_name["estimates"], touching)
-        facts.append(
-            "The relations that it is told are simulated, too: their touching F1 is "
-            f"{found} % between matched objects. The paper's network reaches {paper}."
-        )
-    if "default-weak" in by_name:
-        found = column_cell(by_name["default-weak"], touching)
+    facts = [
+        "The optimiser's weights were searched on other seeds of the sampler that these rooms "
+        "come from.",
+        "The relations that it is told are simulated, too: their touching F1 is "
+        f"{column_cell(given, touching)} % between matched objects. The paper's network reaches "
+        f"{paper}.",
+    ]
+    if weak is not None:
         facts.append(
             "`default-weak` gets the same boxes with relations that are about as wrong as the "
-            f"paper's (touching F1 {found} %)."
+            f"paper's (touching F1 {column_cell(weak, touching)} %)."
         )
     return " ".join(facts)
-
-
-def check_same_targets(scores: Sequence[ScoreFile]) -> None:
-    """Refuse scores that cannot stand in one table.
-
-    Raises:
-        ValueError: there are none, or they are of different targets.
-    """
-    if not scores:
-        raise ValueError("found no files of scores, expected at least one")
-    for score in scores[1:]:
-        if score.targets_hash != scores[0].targets_hash:
-            raise ValueError(
-                f"{score.method}: found scores on other targets ({score.targets_hash}) than "
-                f"{scores[0].method} ({scores[0].targets_hash}), expected the same"
-            )
-
-
-def whole_rooms(scores: Sequence[ScoreFile]) -> list[ScoreFile]:
-    """Return the methods that saw whole rooms; all of them if none did."""
-    return [score for score in scores if score.fov_deg == _WHOLE] or list(scores)
 
 
 def replace_between(text: str, name: str, content: str) -> str:
@@ -144,27 +132,41 @@ def replace_between(text: str, name: str, content: str) -> str:
 
 
 def _introduction(scores: Sequence[ScoreFile]) -> list[str]:
-    first = scores[0]
-    return [
+    first, ours = scores[0], are_simulated(scores)
+    parts = [
         "# Results",
-        "Every number on this page is written by `panoscene eval report` from the files in "
-        "`results/`; nothing is typed by hand. Made with",
-        "```text\npanoscene eval export -o runs/rooms\npanoscene eval score runs/rooms -o results\n"
-        "panoscene eval report results -o RESULTS.md --readme README.md\n```",
+        "Every number on this page is written by `panoscene eval report` from "
+        f"{'the files in `results/`' if ours else 'files of scores'}; nothing is typed by hand."
+        f"{' Made with' if ours else ''}",
+    ]
+    if ours:
+        parts.append(
+            "```text\npanoscene eval export -o runs/rooms\n"
+            "panoscene eval score runs/rooms -o results\n"
+            "panoscene eval report results -o RESULTS.md --readme README.md\n```"
+        )
+    page = "[docs/eval.md](docs/eval.md)" if ours else "the page `eval` of panoscene's docs"
+    parts.append(
         f"Targets: {first.data or 'scenes'} ({first.scenes} scenes, {first.objects} objects, hash "
-        f"`{first.targets_hash}`). In brackets the 95 % interval of {first.replicates} bootstrap "
-        "resamples of the scenes. Scenes without a prediction count as empty, never as absent. "
-        "`-` stands where there is nothing to measure, and a number without brackets either has an "
-        "interval that is narrower than its last digit, or was not resampled (single labels and "
-        "categories, matched IoU). What each metric is: [docs/eval.md](docs/eval.md).",
-        "**There are no networks yet.** `estimates` simulates what they will say: boxes, "
-        "categories, scores, layout and relations with known errors. The other rows say what is "
-        "made of that, so the differences between rows mean something and the levels do not.",
-        markdown_table(
-            ["method", "kind", "what it is"],
-            [[f"`{score.method}`", score.kind, score.description] for score in scores],
-            left=3,
-        ),
+        f"`{first.targets_hash}`). {_intervals(scores)} Scenes without a prediction count as "
+        "empty, never as absent. `-` stands where there is nothing to measure. What each metric "
+        f"is: {page}."
+    )
+    if ours and all(score.kind != "prediction" for score in scores):
+        parts.append(
+            "**There are no networks yet.** `estimates` simulates what they will say: boxes, "
+            "categories, scores, layout and relations with known errors. The other rows say what "
+            "is made of that, so the differences between rows mean something and the levels do not."
+        )
+    elif ours:
+        parts.append(
+            "`estimates` simulates networks: boxes, categories, scores, layout and relations with "
+            "known errors."
+        )
+    rows = [[f"`{score.method}`", score.kind, score.description] for score in scores]
+    return [
+        *parts,
+        markdown_table(["method", "kind", "what it is"], rows, left=3),
         "## Summary",
         "One number from each part of this page.",
         summary_table(scores),
@@ -172,21 +174,66 @@ def _introduction(scores: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
+def _intervals(scores: Sequence[ScoreFile]) -> str:
+    """Return what stands in brackets, and what does not."""
+    counts = sorted({score.replicates for score in scores if score.replicates})
+    if not counts:
+        return "There are no intervals: the scores were made with `--replicates 0`."
+    files = "`results/*.json`" if are_simulated(scores) else "the files of scores"
+    without = [f"`{score.method}`" for score in scores if not score.replicates]
+    none = f" (none for {', '.join(without)})" if without else ""
+    return (
+        f"In brackets the 95 % interval of {' or '.join(map(str, counts))} bootstrap resamples of "
+        f"the scenes{none}. It is left out where it is narrower than the last digit; intervals of "
+        f"single labels and corner groups are in {files}. Matched IoU, numbers of targets, "
+        "single categories and comparisons of meshes were not resampled and have none."
+    )
+
+
 def _detection_part(scores: Sequence[ScoreFile]) -> list[str]:
+    empty = categories_without_targets(scores[0])
+    total = len(CATEGORIES)
+    names = f" ({', '.join(f'`{name}`' for name in empty)})" if len(empty) <= _FEW else ""
+    mean = f"all {total}"
+    if empty:
+        mean = f"all {total} but the {len(empty)} without targets{names}"
+    optimistic = (
+        " AP of few targets is optimistic: the intervals are corrected for that, so they reach "
+        "farther down than up."
+        if any(score.replicates for score in scores)
+        else ""
+    )
+    detected = detected_categories(scores)
     return [
         "## Detection",
         "Average precision (AP) in the standard definition, in percent: oriented 3D IoU above "
-        "0.15, 0.25 or 0.5, mean over the 11 common categories or all 57. AP of few targets is "
-        "optimistic: the intervals are corrected for that, so they reach farther down than up.",
-        score_table(scores, DETECTION),
+        f"0.15, 0.25 or 0.5, mean over the 11 common categories or {mean}.{optimistic}",
+        score_table(scores, with_counts(DETECTION, scores)),
+        _worse_than_its_input(scores),
         "Recall is the share of all targets that is found, precision the share of the "
         "predictions that are right; the IoU is that of what is found.",
         score_table(scores, RECALL),
         "The same AP in the definition of the authors' release: its recall divides by the number "
-        "of detections, so a missed object costs nothing. Only these may stand next to the "
-        "paper's.",
+        "of detections, so a missed object costs nothing, and its mean is over those of the "
+        f"{total} categories that are detected{f' ({detected})' if detected else ''}, with 0 for "
+        "those without targets. Only these may stand next to the paper's.",
         score_table(scores, RELEASED),
+        lower_released_note(scores),
     ]
+
+
+def _worse_than_its_input(scores: Sequence[ScoreFile]) -> str:
+    """Return why the authors' settings lose; empty unless they do, on our rooms."""
+    rows = [row_named(scores, name) for name in ("released", "estimates")]
+    found = [None if row is None else row.metrics.get(AP_15_57.metric) for row in rows]
+    values = [None if one is None else one.value for one in found]
+    if values[0] is None or values[1] is None or values[0] >= values[1]:
+        return ""
+    return (
+        "Why is `released` worse than its input? It takes the published weights and learning rate "
+        "as they are, and keeps whatever comes out: with true relations they improve the boxes, "
+        "with wrong ones they do not ([docs/arrange.md](docs/arrange.md) has the experiment)."
+    )
 
 
 def _plausibility_part(scores: Sequence[ScoreFile]) -> list[str]:
@@ -196,14 +243,19 @@ def _plausibility_part(scores: Sequence[ScoreFile]) -> list[str]:
         "is entirely outside.",
         score_table(scores, PAPER_COUNTS),
     ]
-    truth = next((score for score in scores if score.method == "truth"), None)
+    truth = truth_row(scores)
     floor = None if truth is None else truth.metrics.get("plausibility.paper_hitting_floor")
     if floor is not None and floor.value:
         parts.append(
             f"Why does the truth hit the floor {floor.value:.2f} times per scene? The paper's test "
-            "shrinks boxes, but to no less than 1 cm: a carpet that is flatter grows, and reaches "
-            "through the floor that it lies on."
+            "shrinks boxes, but to no less than 1 cm: a flatter one, such as a carpet, grows, and "
+            "reaches through the floor that it lies on."
         )
+    true_scores = (
+        " True boxes all have the score 1, so all are kept."
+        if row_named(scores, "true-boxes")
+        else ""
+    )
     parts += [
         "What those counts overlook: collisions per pair of objects, what sticks out of the room, "
         "and objects that nothing holds (the distance that they would fall is the mean over all "
@@ -211,7 +263,7 @@ def _plausibility_part(scores: Sequence[ScoreFile]) -> list[str]:
         score_table(scores, PLAUSIBILITY),
         "Who predicts less collides less. Here each method keeps only as many of its best objects "
         "as it needs to find 20, 40 or 60 % of all targets. `-`: the method never finds as many, "
-        "whatever it keeps. True boxes all have the score 1, so all are kept.",
+        f"whatever it keeps.{true_scores}",
         score_table(scores, MATCHED_RECALL),
     ]
     return parts
@@ -228,11 +280,19 @@ def _relations_part(scores: Sequence[ScoreFile]) -> list[str]:
         "objects answers fewer questions. TNR is the share of rightly denied relations; a random "
         "guess of a yaw is 90° off. The last row is the paper's network on its own data.",
         score_table(scores, MATCHED_RELATIONS, beside=[paper_relations_row(MATCHED_RELATIONS)]),
+        "`farther_than` is measured too, but not listed: one of two objects is always the farther "
+        "one, so its F1 is nothing but the share of pairs in the right order, a coin gets half of "
+        "them right, and the paper prints no number to compare it with.",
         "Do the predicted *boxes* have the relations that the true boxes have? Between matched "
         "objects; yaw errors are from the nearest of 8 directions to the true difference.",
         score_table(scores, FIDELITY),
     ]
-    truth = next((score for score in scores if score.method == "truth"), None)
+    return [*parts, _flawed_truth(scores)]
+
+
+def _flawed_truth(scores: Sequence[ScoreFile]) -> str:
+    """Return why the truth does not have all of its own relations; empty if it has."""
+    truth = truth_row(scores)
     short: list[str] = []
     known = {} if truth is None else truth.metrics
     for column in FIDELITY:
@@ -240,14 +300,14 @@ def _relations_part(scores: Sequence[ScoreFile]) -> list[str]:
         if column.heading.endswith("F1") and measured is not None and measured.value is not None:
             cell = measured_cell(Measured(value=measured.value), column.factor)
             short += [f"{column.heading} {cell}"] if measured.value < 1 else []
-    if short:
-        parts.append(
-            f"Why is the truth not perfect ({', '.join(short)})? Its files say which relations "
-            "hold; here they are derived again from the boxes. Things exactly as far apart as the "
-            "tolerance of 10 cm (a sampled stool before its piano, a window below the ceiling) "
-            "are on either side of it by rounding."
-        )
-    return parts
+    if not short:
+        return ""
+    such = " (a sampled stool before its piano, a window below the ceiling)"
+    return (
+        f"Why is the truth not perfect ({', '.join(short)})? Its files say which relations hold; "
+        "here they are derived again from the boxes. Things exactly as far apart as the tolerance "
+        f"of 10 cm{such if are_simulated(scores) else ''} are on either side of it by rounding."
+    )
 
 
 def _meshes_part(scores: Sequence[ScoreFile]) -> list[str]:
@@ -275,104 +335,8 @@ def _meshes_part(scores: Sequence[ScoreFile]) -> list[str]:
     if missing:
         parts += [
             "## What is not here",
-            f"There are no rows of {' and '.join(missing)}: they need meshes, and sampled "
-            "rooms have boxes only. `panoscene eval score --shapes` measures them, and `eval "
-            "report` then shows them here.",
+            f"There are no rows of {' and '.join(missing)}: they need meshes"
+            f"{', and sampled rooms have boxes only' if are_simulated(scores) else ''}. `panoscene "
+            "eval score --shapes` measures them, and `eval report` then shows them here.",
         ]
-    return parts
-
-
-def _layout_table(scores: Sequence[ScoreFile]) -> str:
-    head = ["methods", "reading", *(f"3D IoU, {group}" for group in CORNER_GROUPS)]
-    head += ["2D IoU", "corner error, %", "pixel error, %", "degenerate"]
-    rows: dict[tuple[str, ...], list[str]] = {}
-    for score in scores:
-        for reading in ("regularised", "raw"):
-            start = f"layout.{reading}"
-            if f"{start}.overall.scenes" not in score.metrics:
-                continue
-            groups = [f"{start}.{group}.iou_3d" for group in CORNER_GROUPS]
-            columns = [Column("", name, 100.0, interval=False) for name in groups[:-1]]
-            columns += [Column("", groups[-1], 100.0)]
-            columns += [Column("", f"{start}.overall.iou_2d", 100.0)]
-            columns += [
-                Column("", f"{start}.overall.{name}") for name in ("corner_error", "pixel_error")
-            ]
-            columns += [Column("", f"{start}.overall.degenerate", interval=False, digits=0)]
-            cells = (reading, *(column_cell(score, column) for column in columns))
-            rows.setdefault(cells, []).append(f"`{score.method}`")
-    return markdown_table(head, [[", ".join(who), *row] for row, who in rows.items()], left=2)
-
-
-def _fov_part(scores: Sequence[ScoreFile]) -> list[str]:
-    splits = [score for score in scores if score.fov_deg != _WHOLE]
-    if not splits:
-        return []
-    default = [score for score in whole_rooms(scores) if score.method == "default"]
-    rows = [
-        [f"`{score.method}`", f"{score.fov_deg}°", *(column_cell(score, c) for c in _FOV_COLUMNS)]
-        for score in (*default, *sorted(splits, key=lambda score: -score.fov_deg))
-        if score in splits or score.fov_deg == _WHOLE
-    ]
-    return [
-        "## Field of view",
-        "Horizontal splits of the panorama, each on its own with the full layout. What is lost is "
-        "what relations across the borders of splits are good for.",
-        markdown_table(["method", "split", *(column.heading for column in _FOV_COLUMNS)], rows),
-        "The paper's AP 15 over '57' categories, in its own definition of AP and on its own data:",
-        paper_fov_table(),
-    ]
-
-
-_FOV_COLUMNS = (
-    DETECTION[1],
-    DETECTION[2],
-    PAPER_COUNTS[0],
-    Column("boxes obey: touching F1", "fidelity.touching_f1", 100.0),
-)
-
-
-def _category_part(scores: Sequence[ScoreFile]) -> list[str]:
-    best = next((score for score in scores if score.method == "default"), scores[0])
-    given = next((score for score in scores if score.method == "estimates"), None)
-    given = None if given is best else given
-    tables = [best] if given is None else [best, given]
-    names = sorted({name for score in tables for name in score.categories})
-
-    def cell(score: ScoreFile, name: str, key: str) -> str:
-        row = score.categories.get(name, {})
-        return measured_cell(row.get(key), 100.0)
-
-    def count(name: str) -> str:
-        rows = [score.categories[name] for score in tables if name in score.categories]
-        return measured_cell(rows[0]["targets"], digits=0)
-
-    head = ["category", "targets"]
-    head += [f"`{best.method}` AP 15", "AP 25", "AP 50", "released AP 15"]
-    if given is not None:
-        head += [f"`{given.method}` AP 15", "AP 25", "AP 50"]
-    keys = ("ap_15", "ap_25", "ap_50")
-    rows = [
-        [
-            f"`{name}`",
-            count(name),
-            *(cell(best, name, key) for key in (*keys, "released_ap_15")),
-            *(cell(given, name, key) for key in keys if given is not None),
-        ]
-        for name in names
-    ]
-    parts = [
-        "## Categories",
-        f"AP in percent of `{best.method}`"
-        + ("" if given is None else f", and of `{given.method}` that it starts from")
-        + ". `-`: no targets, and then the released definition counts 0 for false detections.",
-        markdown_table(head, rows),
-    ]
-    flat = [f"`{name}` {cell(best, name, 'ap_15')}" for name in _FLAT if name in best.categories]
-    if flat:
-        parts.append(
-            f"Thin objects fare worst ({', '.join(flat)}): where a box is a few centimetres thin "
-            "or less, an error of that size leaves no overlap, though the object is all but in "
-            "its place."
-        )
     return parts

@@ -46,7 +46,9 @@ class ScoreFile(_Model):
     objects: Annotated[int, Field(ge=0)]
     """Target objects."""
     missing: Annotated[int, Field(ge=0)]
-    """Scenes without a prediction; they count as empty, never as absent."""
+    """Scenes without a prediction that can be read; they count as empty, never as absent."""
+    invalid: Annotated[int, Field(ge=0)] = 0
+    """Predictions in which something is not valid, and so counts as not predicted."""
     targets_hash: str
     """First 16 hexadecimal digits of the SHA-256 of all target files."""
     predictions_hash: str

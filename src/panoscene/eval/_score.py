@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -10,15 +11,27 @@ import torch
 
 from panoscene import __version__
 from panoscene.eval._bootstrap import REPLICATES
+from panoscene.eval._layout_scores import layout_record
 from panoscene.eval._pooling import RECALL_LEVELS, pooled_categories, pooled_metrics
+from panoscene.eval._predictions import Prediction, read_prediction
 from panoscene.eval._results import ScoreFile
 from panoscene.eval._scene_records import SceneRecords, records_at_recall, scene_records
-from panoscene.scene import Problem, SceneFormatError, read_scene
+from panoscene.scene import Problem, Scene, SceneFormatError, read_scene
 
 _CHUNK = 32
 """Scenes that a process measures at a time."""
 _WORTH_PROCESSES = 128
 """Fewer scenes are done before another process has loaded the libraries."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What some of the scenes gave."""
+
+    records: list[SceneRecords]
+    warnings: list[str]
+    invalid: int
+    """Predictions with something that is not valid."""
 
 
 def score_folder(
@@ -35,11 +48,14 @@ def score_folder(
     seed: int = 0,
     workers: int = 1,
     progress: Callable[[int], None] | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> ScoreFile:
     """Return the scores of a folder of predictions against a folder of targets.
 
     A prediction belongs to the target with the same file name. A target without a prediction
     counts as an empty room with the worst layout; a prediction without a target is an error.
+    What is not valid in a prediction counts as not predicted: the raw polygon, the layout, an
+    object or the relations, or else all of it. Targets have to be valid.
 
     Args:
         predictions: folder of scene.json files.
@@ -54,9 +70,10 @@ def score_folder(
         seed: of the resampling.
         workers: processes that measure scenes.
         progress: called with the number of scenes done.
+        warn: called with one line for each prediction that is missing or not valid.
 
     Raises:
-        SceneFormatError: a file is not a scene, or a prediction has no target.
+        SceneFormatError: a target is not a scene, or a prediction has no target.
         OSError: a folder or file cannot be read.
     """
     names = _names(predictions, targets)
@@ -64,18 +81,25 @@ def score_folder(
         (predictions, targets, names[first : first + _CHUNK], shapes)
         for first in range(0, len(names), _CHUNK)
     ]
-    records: list[SceneRecords] = []
-    tell = progress or (lambda _count: None)
+    parts: list[_Part] = []
+
+    def keep(part: _Part) -> None:
+        parts.append(part)
+        for warning in part.warnings:
+            if warn is not None:
+                warn(warning)
+        if progress is not None:
+            progress(len(part.records))
+
     if workers > 1 and len(names) >= _WORTH_PROCESSES:
         context = get_context("spawn")
         with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
             for part in pool.map(_measure, jobs):
-                records += part
-                tell(len(part))
+                keep(part)
     else:
         for part in map(_measure, jobs):
-            records += part
-            tell(len(part))
+            keep(part)
+    records = [record for part in parts for record in part.records]
     at_recall = {level: records_at_recall(records, level) for level in RECALL_LEVELS}
     return ScoreFile(
         panoscene=__version__,
@@ -87,6 +111,7 @@ def score_folder(
         scenes=len(records),
         objects=sum(record.targets for record in records),
         missing=sum(record.missing for record in records),
+        invalid=sum(part.invalid for part in parts),
         targets_hash=_hash(targets, names),
         predictions_hash=_hash(predictions, names),
         replicates=replicates,
@@ -110,18 +135,35 @@ def _names(predictions: Path, targets: Path) -> list[str]:
     return wanted
 
 
-def _measure(job: tuple[Path, Path, list[str], bool]) -> list[SceneRecords]:
+def _measure(job: tuple[Path, Path, list[str], bool]) -> _Part:
     predictions, targets, names, shapes = job
     threads = torch.get_num_threads()
     # tensors this small are slower with more threads, and processes already share the cores
     torch.set_num_threads(1)
     try:
         true = [read_scene(targets / name) for name in names]
-        paths = [predictions / name for name in names]
-        found = [read_scene(path) if path.exists() else None for path in paths]
-        return scene_records(found, true, shapes=shapes)
+        found = [
+            read_prediction(predictions / name, target)
+            for name, target in zip(names, true, strict=True)
+        ]
+        records = scene_records([prediction.scene for prediction in found], true, shapes=shapes)
+        return _Part(
+            records=list(map(_with_layout_of, records, found, true)),
+            warnings=[prediction.warning for prediction in found if prediction.warning],
+            invalid=sum(prediction.invalid for prediction in found),
+        )
     finally:
         torch.set_num_threads(threads)
+
+
+def _with_layout_of(record: SceneRecords, prediction: Prediction, target: Scene) -> SceneRecords:
+    """Return the record in which a layout that was not valid counts as degenerate."""
+    if not (prediction.no_layout or prediction.no_raw):
+        return record
+    worst = layout_record(None, target)
+    if prediction.no_layout:
+        return replace(record, layout=worst)
+    return replace(record, layout=replace(record.layout, raw=worst.regularised))
 
 
 def _hash(folder: Path, names: Sequence[str]) -> str:
@@ -129,5 +171,5 @@ def _hash(folder: Path, names: Sequence[str]) -> str:
     for name in names:
         path = folder / name
         digest.update(f"{name}\0".encode())
-        digest.update(path.read_bytes() if path.exists() else b"")
+        digest.update(path.read_bytes() if path.is_file() else b"")
     return digest.hexdigest()[:16]

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from panoscene.eval._report_facts import categories_with
 from panoscene.eval._results import Measured, ScoreFile
-from panoscene.scene import PANOCONTEXT_12
+from panoscene.scene import CATEGORIES, COMMON_11, PANOCONTEXT_12
 
 
 class Column(NamedTuple):
@@ -25,12 +26,12 @@ def _percent(heading: str, metric: str, *, interval: bool = True) -> Column:
     return Column(heading, metric, 100.0, interval)
 
 
-DETECTION: tuple[Column, ...] = (
-    _percent("AP 15, 11 cat.", "detection.ap_15_mean_11"),
-    _percent("AP 15, 57 cat.", "detection.ap_15_mean_57"),
-    _percent("AP 25, 57 cat.", "detection.ap_25_mean_57"),
-    _percent("AP 50, 57 cat.", "detection.ap_50_mean_57"),
+DETECTION: tuple[Column, ...] = tuple(
+    _percent(f"AP {iou}, {count} cat.", f"detection.ap_{iou}_mean_{count}")
+    for count in (11, 57)
+    for iou in (15, 25, 50)
 )
+AP_15_57, AP_25_57 = DETECTION[3:5]
 RECALL: tuple[Column, ...] = (
     _percent("recall 15, %", "detection.recall_15"),
     _percent("recall 25, %", "detection.recall_25"),
@@ -38,11 +39,9 @@ RECALL: tuple[Column, ...] = (
     _percent("precision 15, %", "detection.precision_15"),
     Column("matched IoU", "detection.matched_iou"),
 )
-RELEASED: tuple[Column, ...] = (
-    _percent("released AP 15, 11 cat.", "detection.released_ap_15_mean_11"),
-    _percent("released AP 15, 57 cat.", "detection.released_ap_15_mean_57"),
-    _percent("released AP 25, 57 cat.", "detection.released_ap_25_mean_57"),
-    _percent("released AP 50, 57 cat.", "detection.released_ap_50_mean_57"),
+RELEASED: tuple[Column, ...] = tuple(
+    _percent(f"released {column.heading}", column.metric.replace(".", ".released_"))
+    for column in DETECTION
 )
 PAPER_COUNTS: tuple[Column, ...] = (
     Column("colliding pairs", "plausibility.paper_colliding_pairs"),
@@ -84,9 +83,9 @@ MATCHED_RELATIONS: tuple[Column, ...] = (
     _percent("wall F1", "relations.touching_wall_f1"),
     _percent("wall TPR", "relations.touching_wall_tpr"),
     _percent("wall TNR", "relations.touching_wall_tnr"),
-    _percent("floor F1", "relations.on_floor_f1", interval=False),
-    _percent("ceiling F1", "relations.under_ceiling_f1", interval=False),
-    _percent("in room F1", "relations.inside_room_f1", interval=False),
+    _percent("floor F1", "relations.on_floor_f1"),
+    _percent("ceiling F1", "relations.under_ceiling_f1"),
+    _percent("in room F1", "relations.inside_room_f1"),
     Column("yaw error, °", "relations.relative_yaw_bin_error_deg"),
     Column("to walls, °", "relations.relative_yaw_wall_bin_error_deg"),
 )
@@ -121,11 +120,17 @@ PENETRATION: tuple[Column, ...] = (
     _percent("depth, cm per scene", "penetration.penetration_depth"),
     Column("volume, litres per scene", "penetration.penetration_volume", 1000.0),
     _percent("worst, cm", "penetration.worst_penetration"),
-    _percent("hulls stand in, %", "penetration.hull_share", interval=False),
-    _percent("boxes stand in, %", "penetration.box_share", interval=False),
+    _percent("hulls stand in, %", "penetration.hull_share"),
+    _percent("boxes stand in, %", "penetration.box_share"),
+)
+FIELD_OF_VIEW: tuple[Column, ...] = (
+    AP_15_57,
+    AP_25_57,
+    PAPER_COUNTS[0],
+    _percent("boxes obey: touching F1", "fidelity.touching_f1"),
 )
 SUMMARY: tuple[Column, ...] = (
-    DETECTION[1],
+    AP_15_57,
     RECALL[0],
     PAPER_COUNTS[0],
     PLAUSIBILITY[1],
@@ -157,6 +162,25 @@ def score_table(
         for score in scores
     ]
     return markdown_table(head, [*rows, *map(list, beside)], left=2)
+
+
+def with_counts(columns: Sequence[Column], scores: Sequence[ScoreFile]) -> list[Column]:
+    """Return columns whose headings say how many of the categories have targets, if not all.
+
+    The standard mean is over those. The released one is over the categories with detections,
+    which differ from method to method, so its headings stay as they are.
+    """
+    known = set(categories_with(scores[0], "targets"))
+    counted: list[Column] = []
+    for column in columns:
+        heading = column.heading
+        for categories in (COMMON_11, CATEGORIES):
+            total, found = len(categories), len(known.intersection(categories))
+            standard = column.metric.startswith("detection.ap_")
+            if standard and column.metric.endswith(f"_mean_{total}") and 0 < found < total:
+                heading = heading.replace("cat.", f"cat. ({found} with targets)")
+        counted.append(column._replace(heading=heading))
+    return counted
 
 
 def column_cell(score: ScoreFile, column: Column) -> str:
