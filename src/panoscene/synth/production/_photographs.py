@@ -83,6 +83,8 @@ def photograph_home(
             write_panorama(panorama, root, split=job.split, files=files, extra=extra)
             if written is not None:
                 written(camera_job.name)
+        # before the next one is built: one of them takes hundreds of MB
+        del lit
 
 
 def _prepared(
