@@ -106,6 +106,7 @@ def label_fill(colour: str) -> str:
         ('#eedd88', True)
     """
     ink, paper, fill = (_channels(code) for code in (INK, PAPER, colour))
+    mixed = fill
     for step in range(21):
         mixed = [round(f + (p - f) * step / 20) for f, p in zip(fill, paper, strict=True)]
         if (_luminance(mixed) + 0.05) / (_luminance(ink) + 0.05) >= _READABLE:
