@@ -32,7 +32,7 @@ from panoscene.synth.assets import _debian as debian
 from panoscene.synth.assets._debian import unpack_libraries
 from panoscene.synth.assets._prepare import _in_parallel
 
-CACHE = Path(os.environ.get("PANOSCENE_ASSETS", "/work/assets_cache"))
+CACHE = Path(os.environ.get("PANOSCENE_ASSETS", "no-cache-here"))
 
 CHAIR = """
 mtllib chair.mtl
