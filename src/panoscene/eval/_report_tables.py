@@ -99,10 +99,12 @@ def fov_part(scores: Sequence[ScoreFile]) -> list[str]:
     # `net-quarters` is a split of `net`; without such names, rows of the same kind belong together
     same = [one for one in whole if any(s.method.startswith(f"{one.method}-") for s in splits)]
     same = same or [one for one in whole if one.kind in {score.kind for score in splits}]
+    # for comparison: the input, baselines and oracles, which see all
+    beside = [one for one in whole if one.kind in _REFERENCES and one not in same]
     columns = with_counts(FIELD_OF_VIEW, scores)
     rows = [
         [f"`{score.method}`", f"{score.fov_deg}°", *(column_cell(score, c) for c in columns)]
-        for score in (*same, *sorted(splits, key=lambda score: -score.fov_deg))
+        for score in (*same, *sorted(splits, key=lambda score: -score.fov_deg), *beside)
     ]
     return [
         "## Field of view",
@@ -113,6 +115,9 @@ def fov_part(scores: Sequence[ScoreFile]) -> list[str]:
         paper_fov_table(),
         paper_fov_note(),
     ]
+
+
+_REFERENCES = ("input", "baseline", "oracle")
 
 
 def category_part(scores: Sequence[ScoreFile]) -> list[str]:
