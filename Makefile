@@ -56,5 +56,5 @@ $(VENV)/.runtime-installed: pyproject.toml $(BIN)/python
 $(VENV)/.dev-installed: pyproject.toml $(BIN)/python
 	@echo "Installing panoscene and its test tools into $(VENV); the first time takes minutes ..."
 	@$(INSTALL) --upgrade 'pip>=25.1'
-	@$(INSTALL) -e '.[synth,ray]' --group dev
+	@$(INSTALL) -e '.[synth,ray,train]' --group dev
 	@touch $@ $(VENV)/.runtime-installed

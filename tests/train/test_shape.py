@@ -1,0 +1,155 @@
+"""Training of the shape network."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from panoscene.models.shape import CONFIGS
+from panoscene.synth.assets import CadModel, Material, add_models
+from panoscene.train import TrainError, TrainRecipe, read_train_recipe
+from panoscene.train._shape import ShapeOptions, ShapeTask, shape_task
+from panoscene.train._shape_scores import METHODS, canonical, nearest_model, shape_scores
+
+for package in ("skimage", "fast_simplification"):
+    pytest.importorskip(package, reason="an optional package")
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ROOT / "samples" / "synth"
+TINY = CONFIGS["compact"].model_copy(update={"crop": 32, "features": 32, "hidden": 32})
+
+
+def body(name: str, category: str, *boxes: tuple[tuple[float, ...], tuple[float, ...]]) -> CadModel:
+    """Return a model made of boxes, each given by size and centre."""
+    parts = []
+    for size, place in boxes:
+        part = trimesh.creation.box(size)
+        part.apply_translation(place)
+        parts.append(part)
+    mesh = trimesh.util.concatenate(parts)
+    vertices = mesh.vertices - (mesh.vertices.min(0) + mesh.vertices.max(0)) / 2
+    size = np.ptp(vertices, axis=0).tolist()
+    return CadModel(
+        id=f"test/{name}",
+        base=f"test/{name}",
+        category=category,
+        vertices=vertices.astype(np.float32),
+        normals=np.zeros((len(vertices), 3), np.float32),
+        uv=np.zeros((len(vertices), 2), np.float32),
+        faces=np.asarray(mesh.faces, np.int32),
+        face_material=np.zeros(len(mesh.faces), np.int16),
+        materials=(Material("grey"),),
+        size=(size[0], size[1], size[2]),
+    )
+
+
+@pytest.fixture(name="folder", scope="module")
+def fixture_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shapes")
+    seat = ((0.5, 0.5, 0.3), (0.0, 0.0, 0.0))
+    back = ((0.5, 0.1, 0.6), (0.0, -0.2, 0.45))
+    top = ((1.2, 0.7, 0.1), (0.0, 0.0, 0.7))
+    foot = ((0.3, 0.3, 0.7), (0.0, 0.0, 0.35))
+    models = [
+        body("chair", "chair", seat, back),
+        body("table", "table", top, foot),
+        body("thin", "carpet", ((2.0, 1.0, 0.01), (0.0, 0.0, 0.0))),
+    ]
+    add_models(folder / "assets", models)
+    return folder
+
+
+@pytest.fixture(name="task")
+def fixture_task(folder: Path, monkeypatch: pytest.MonkeyPatch) -> ShapeTask:
+    monkeypatch.setattr("panoscene.train._shape.CONFIGS", {"compact": TINY})
+    options = {
+        "folder": str(folder / "data"),
+        "assets": str(folder / "assets"),
+        "points": 64,
+        "renders": 2,
+        "frozen_views": 2,
+        "near_weight": 0.3,
+    }
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
+        data=SAMPLES, options=options,
+    )  # fmt: skip
+    with torch.random.fork_rng():
+        torch.manual_seed(0)  # noqa: TID251 (the network starts from it)
+        task = shape_task(recipe)
+    assert isinstance(task, ShapeTask)
+    return task
+
+
+def test_data_is_prepared_and_thin_models_are_left_out(task: ShapeTask) -> None:
+    assert sorted(task.shapes) == ["test/chair", "test/table"]
+    assert (task.options.folder / "crops-train.npz").is_file()
+    assert task.sample_count() == 2 * len(task.seen)
+    one = task.sample(0, torch.Generator().manual_seed(1))
+    again = task.sample(0, torch.Generator().manual_seed(1))
+    assert torch.equal(one.crop, again.crop)
+    assert torch.equal(one.near, again.near)
+    assert task.rate("encoder.backbone.network.conv_stem.weight") == 0
+    assert task.rate("encoder.code.0.weight") == 1
+
+
+@pytest.mark.train
+def test_overfits_two_models(task: ShapeTask) -> None:
+    before = task.validate(task.model.eval(), None)
+    with torch.random.fork_rng():
+        torch.manual_seed(0)  # noqa: TID251 (the network starts from it)
+        head = [p for n, p in task.model.named_parameters() if task.rate(n) > 0]
+        optimiser = torch.optim.AdamW(head, 5e-3)
+        task.model.train()
+        for step in range(80):
+            generator = torch.Generator().manual_seed(step)
+            batch = task.collate([task.sample(k, generator) for k in range(task.sample_count())])
+            loss = torch.stack(list(task.losses(task.model, batch).values())).sum()
+            optimiser.zero_grad()
+            loss.backward()
+            assert all(bool(p.grad.isfinite().all()) for p in head if p.grad is not None)
+            optimiser.step()
+    task.model.eval()
+    after = task.validate(task.model, None)
+    name = "seen_iou" if "seen_iou" in after else "unseen_iou"
+    assert after[name] > max(before[name], after[name.replace("iou", "box_iou")]) + 0.15
+    assert set(task.pictures(task.model)) <= {"crops", "unseen", "seen"}
+
+
+def test_the_truth_scores_one(task: ShapeTask) -> None:
+    from panoscene.eval import shape_errors  # noqa: PLC0415
+
+    truth = canonical(task.shapes["test/chair"])
+    found = shape_errors(truth, truth, generator=torch.Generator().manual_seed(0), points=500)
+    assert found.f_score == pytest.approx(1.0)
+    assert found.volume_iou == pytest.approx(1.0)
+
+
+def test_scores_name_methods_and_categories(task: ShapeTask) -> None:
+    task.unseen = ["test/chair"]
+    task.model.eval()
+    scores = shape_scores(task, points=200, resolution=32)
+    unseen = scores["unseen"]
+    assert isinstance(unseen, dict)
+    assert unseen["objects"] == 1
+    assert tuple(unseen["mean"]) == METHODS
+    assert list(unseen["by_category"]) == ["chair"]
+    assert nearest_model(task, "sofa", torch.ones(3)) is None
+
+
+@pytest.mark.parametrize("edition", ["compact", "paper"])
+def test_recipes_fit_their_options(edition: str) -> None:
+    recipe = read_train_recipe(ROOT / "configs" / edition / "shape.yaml")
+    assert (recipe.stage, recipe.edition) == ("shape", edition)
+    assert recipe.stage_options(ShapeOptions).near_weight > 0
+
+
+def test_a_recipe_without_data_is_refused(tmp_path: Path) -> None:
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=1, learning_rate=1.0,
+        options={"folder": str(tmp_path)},
+    )  # fmt: skip
+    with pytest.raises(TrainError, match="data: found none"):
+        shape_task(recipe)
