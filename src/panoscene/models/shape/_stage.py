@@ -1,0 +1,117 @@
+"""The stage: a photo and its objects to shapes."""
+
+from pathlib import Path
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from panoscene.geometry import perspective_crop, view_relative_yaw
+from panoscene.models._editions import Edition
+from panoscene.models._weights import read_weights, shipped_weights
+from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh
+
+from ._config import CONFIGS
+from ._extract import extract_meshes
+from ._network import ShapeNetwork, build_shape, view_hints
+
+THIN_METRES = 0.03
+"""Objects whose smallest side is below it are slabs."""
+THIN_SHARE = 0.06
+"""So are those whose smallest side is less than this share of the longest: carpets, pictures."""
+_BATCH = 32
+
+
+class ShapeStage:
+    """Gives every object a mesh: predicted, or its box where that says more.
+
+    Args:
+        network: With trained weights; it is put in evaluation mode.
+        device: To work on.
+    """
+
+    def __init__(self, network: ShapeNetwork, device: str | torch.device = "cpu") -> None:
+        self.device = torch.device(device)
+        self.network = network.to(self.device).eval()
+
+    @torch.inference_mode()
+    def __call__(
+        self, image: Float[Tensor, "3 height width"], objects: Objects, *, resolution: int = 64
+    ) -> Shapes:
+        """Return codes and closed meshes of all objects, in the canonical box [-1/2, 1/2]^3.
+
+        Thin objects get a slab: their box. So do, as ``box``, those whose predicted shape is empty.
+
+        Args:
+            image: Upright panorama, RGB in [0, 1].
+            objects: Their BFoVs say where to look; boxes and categories are used, too.
+            resolution: Of the meshes: 32, 64, 128 or 256 cells along each axis.
+
+        Raises:
+            ValueError: ``resolution`` is none of these.
+
+        Source: paper, Sec. 3.1; slabs are ours.
+        """
+        codes = self.codes(image, objects)
+        network = (~thin_boxes(objects.boxes.size)).nonzero()[:, 0]
+        found = extract_meshes(self.network, codes[network], resolution=resolution)
+        meshes: list[Mesh] = [box_mesh() for _ in range(len(objects.boxes))]
+        sources: list[ShapeSource] = ["slab"] * len(meshes)
+        for index, mesh in zip(network.tolist(), found, strict=True):
+            sources[index] = "box" if mesh is None else "network"
+            meshes[index] = meshes[index] if mesh is None else mesh
+        return Shapes(code=codes.cpu(), mesh=tuple(meshes), source=tuple(sources))
+
+    @torch.inference_mode()
+    def codes(
+        self, image: Float[Tensor, "3 height width"], objects: Objects
+    ) -> Float[Tensor, "n code"]:
+        """Return the shape codes of all objects.
+
+        Args:
+            image: Upright panorama, RGB in [0, 1].
+            objects: Seen in it.
+        """
+        rows = self.network.config.crop
+        image = image.to(self.device)
+        bfov = objects.bfov.to(image)
+        boxes = objects.boxes
+        lon = torch.atan2(boxes.centre[:, 0], boxes.centre[:, 1])
+        hints = view_hints(bfov, boxes.size.to(image), view_relative_yaw(boxes.yaw, lon).to(image))
+        category = objects.category.to(self.device)
+        found = [torch.zeros(0, self.network.config.code, device=self.device)]
+        for start in range(0, len(bfov), _BATCH):
+            piece = slice(start, start + _BATCH)
+            crops = perspective_crop(image, bfov[piece], (rows, rows)).clamp(0, 1)
+            found.append(self.network(crops, category[piece], hints[piece]))
+        return torch.cat(found)
+
+
+def thin_boxes(size: Float[Tensor, "n 3"]) -> Bool[Tensor, " n"]:
+    """Return which boxes are so thin that the box itself is the best shape.
+
+    Examples:
+        >>> thin_boxes(torch.tensor([[2.0, 1.5, 0.01], [0.5, 0.5, 0.9]]))
+        tensor([ True, False])
+    """
+    least, most = size.amin(-1), size.amax(-1)
+    return (least < THIN_METRES) | (least < THIN_SHARE * most)
+
+
+def load_shape_stage(
+    edition: Edition = "compact", weights: Path | None = None, device: str = "cpu"
+) -> ShapeStage:
+    """Return the shape stage with trained weights.
+
+    Args:
+        edition: Size of the network.
+        weights: File of them; None takes those that come with the package (compact only).
+        device: To work on.
+
+    Raises:
+        CheckpointError: The weights are missing or for another network.
+    """
+    network = build_shape(CONFIGS[edition])
+    path = shipped_weights("shape") if weights is None else weights
+    read_weights(path, network, stage="shape", edition=edition)
+    return ShapeStage(network, device)

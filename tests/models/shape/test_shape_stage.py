@@ -1,0 +1,169 @@
+"""Surfaces of fields, and the stage from photo to shapes."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+import trimesh
+from torch import Tensor
+
+from panoscene.geometry import OrientedBoxes, bfov_from_boxes
+from panoscene.models import CheckpointError, WeightsHeader, write_weights
+from panoscene.models.shape import (
+    CONFIGS,
+    ShapeConfig,
+    ShapeNetwork,
+    ShapeStage,
+    build_shape,
+    extract_meshes,
+    load_shape_stage,
+    thin_boxes,
+)
+from panoscene.scene import (
+    CATEGORIES,
+    Layout,
+    Mesh,
+    Objects,
+    Panorama,
+    Scene,
+    box_mesh,
+    read_scene,
+    write_scene,
+)
+
+TINY = CONFIGS["compact"].model_copy(update={"features": 24, "hidden": 24, "crop": 64})
+
+
+@pytest.fixture(name="network", scope="module")
+def fixture_network() -> ShapeNetwork:
+    return build_shape(TINY).eval()
+
+
+def ball_code(config: ShapeConfig, centre: tuple[float, float, float], loud: float = 1.0) -> Tensor:
+    """Return the code of one round element of the last kind, which has no twin."""
+    code = torch.zeros(1, config.elements, config.width)
+    code[0, -1, 0] = loud
+    code[0, -1, 1:4] = 2 * torch.tensor(centre)
+    return code.reshape(1, -1)
+
+
+def without_detail(network: ShapeNetwork) -> ShapeNetwork:
+    with torch.no_grad():
+        network.decoder.leave.weight.zero_()
+        network.decoder.leave.bias.zero_()
+    return network
+
+
+def as_trimesh(mesh: Mesh | None) -> trimesh.Trimesh:
+    assert mesh is not None
+    return trimesh.Trimesh(mesh.vertices.numpy(), mesh.faces.numpy(), process=False)
+
+
+@pytest.mark.parametrize("resolution", [32, 64, 128])
+def test_one_gaussian_is_a_ball(network: ShapeNetwork, resolution: int) -> None:
+    code = ball_code(TINY, (0.1, 0.0, -0.2))
+    (mesh,) = extract_meshes(without_detail(network), code, resolution=resolution)
+    found = as_trimesh(mesh)
+    assert found.is_watertight
+    assert found.is_winding_consistent
+    # the ball fills its box; facing outwards its volume is positive
+    assert found.volume == pytest.approx(math.pi / 6, rel=0.05 if resolution == 32 else 0.02)
+    assert found.bounds == pytest.approx(torch.tensor([[-0.5] * 3, [0.5] * 3]).numpy())
+    radius = torch.as_tensor(found.vertices).norm(dim=1)
+    assert float((radius - 0.5).abs().max()) < 0.02
+
+
+def test_the_surface_is_where_the_field_says(network: ShapeNetwork) -> None:
+    network = without_detail(network)
+    code = torch.cat((ball_code(TINY, (0.2, 0.1, 0.0)), ball_code(TINY, (0.0, 0.0, 0.0), 0.2)))
+    code = code.reshape(2, TINY.elements, -1)
+    code[0, -2, :4] = torch.tensor([0.8, -0.3, 0.2, 0.4])
+    code = code.flatten(1)
+    fine = extract_meshes(network, code, resolution=128)
+    coarse = extract_meshes(network, code, resolution=64)
+    for one, other in zip(fine, coarse, strict=True):
+        first, second = as_trimesh(one), as_trimesh(other)
+        assert first.is_watertight
+        assert first.volume == pytest.approx(second.volume, rel=0.02)
+
+
+def test_shapes_come_in_order_and_empty_ones_are_none(network: ShapeNetwork) -> None:
+    empty = torch.zeros(1, TINY.code)
+    codes = torch.cat((empty, ball_code(TINY, (0.0, 0.0, 0.0)), empty))
+    found = extract_meshes(network, codes, resolution=32)
+    assert [mesh is None for mesh in found] == [True, False, True]
+    assert extract_meshes(network, codes[:0], resolution=64) == ()
+
+
+def test_crumbs_are_left_out(network: ShapeNetwork) -> None:
+    code = ball_code(TINY, (0.2, 0.0, 0.0)).reshape(1, TINY.elements, -1)
+    code[0, -2, :7] = torch.tensor([0.08, -0.9, 0.0, 0.0, -1.0, -1.0, -1.0])
+    (mesh,) = extract_meshes(without_detail(network), code.flatten(1), resolution=64)
+    assert as_trimesh(mesh).body_count == 1
+    assert as_trimesh(mesh).volume == pytest.approx(math.pi / 6, rel=0.02)
+
+
+def test_other_resolutions_are_refused(network: ShapeNetwork) -> None:
+    with pytest.raises(ValueError, match="resolution: found 100"):
+        extract_meshes(network, torch.zeros(1, TINY.code), resolution=100)
+
+
+def objects(lons: list[float], sizes: list[list[float]]) -> Objects:
+    lon = torch.tensor(lons)
+    size = torch.tensor(sizes).reshape(-1, 3)
+    centre = torch.stack((3 * lon.sin(), 3 * lon.cos(), size[:, 2] / 2), 1)
+    boxes = OrientedBoxes(centre, size, torch.pi - lon)
+    n = len(lons)
+    ones = torch.ones(n)
+    category = torch.arange(n) % len(CATEGORIES)
+    return Objects(boxes, category, ones, bfov_from_boxes(boxes, 1.6), ones, ones)
+
+
+def test_thin_things_do_not_vanish(network: ShapeNetwork, tmp_path: Path) -> None:
+    stage = ShapeStage(without_detail(network))
+    things = objects([0.0, 1.0, 2.0], [[0.6, 0.6, 0.9], [2.0, 1.5, 0.01], [0.8, 0.02, 0.6]])
+    assert thin_boxes(things.boxes.size).tolist() == [False, True, True]
+    image = torch.rand(3, 128, 256, generator=torch.Generator().manual_seed(0))
+    shapes = stage(image, things, resolution=32)
+    assert shapes.source[1:] == ("slab", "slab")
+    assert shapes.source[0] in ("network", "box")
+    assert shapes.code is not None
+    assert shapes.code.shape == (3, TINY.code)
+    for mesh in shapes.mesh:
+        assert as_trimesh(mesh).is_watertight
+        assert mesh is not None
+        assert mesh.vertices.abs().max() == pytest.approx(0.5, abs=1e-6)
+    things = replace(things, shapes=shapes)
+    room = Layout(torch.tensor([[-4.0, -4.0], [4.0, -4.0], [4.0, 4.0], [-4.0, 4.0]]))
+    write_scene(Scene(Panorama(256, 128), room, things), tmp_path / "scene.json")
+    assert read_scene(tmp_path / "scene.json").objects.shapes.source == shapes.source
+
+
+def test_no_objects_have_no_shapes(network: ShapeNetwork) -> None:
+    shapes = ShapeStage(network)(torch.rand(3, 64, 128), objects([], []))
+    assert shapes.mesh == ()
+    assert shapes.source == ()
+
+
+def test_turning_the_panorama_changes_no_shape(network: ShapeNetwork) -> None:
+    stage = ShapeStage(network)
+    image = torch.rand(3, 128, 256, generator=torch.Generator().manual_seed(1))
+    sizes = [[0.6, 0.6, 0.9], [1.0, 0.5, 0.7]]
+    before = stage.codes(image, objects([0.2, -1.0], sizes))
+    columns = 100
+    turn = 2 * math.pi * columns / 256
+    lons = [math.remainder(lon + turn, 2 * math.pi) for lon in (0.2, -1.0)]
+    after = stage.codes(image.roll(columns, -1), objects(lons, sizes))
+    torch.testing.assert_close(after, before, atol=2e-4, rtol=1e-3)
+
+
+def test_weights_are_read_and_others_refused(network: ShapeNetwork, tmp_path: Path) -> None:
+    path = tmp_path / "tiny.safetensors"
+    write_weights(path, network, WeightsHeader(stage="shape", edition="compact"))
+    with pytest.raises(CheckpointError, match="shape"):
+        load_shape_stage("compact", path)
+    with pytest.raises(CheckpointError, match="compact"):
+        load_shape_stage("paper", path)
+    assert box_mesh().faces.shape == (12, 3)
