@@ -1,0 +1,100 @@
+"""The backbone and its feature pyramid, on the picture or on the cylinder."""
+
+from collections import OrderedDict
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_weights
+from torchvision.ops import FeaturePyramidNetwork
+
+from panoscene.models._backbone import Backbone, build_backbone
+from panoscene.models._circular import make_circular
+
+from ._config import DetectorConfig
+
+
+class Pyramid(nn.Module):
+    """Feature maps of one width at strides 4, 8, 16, 32, and 64 where the config asks for it."""
+
+    def __init__(self, config: DetectorConfig, imagenet: bool | Path) -> None:
+        super().__init__()
+        circular = config.seam == "circular"
+        self.body = build_backbone(config.backbone, circular=circular, imagenet=imagenet)
+        if config.fold_norms:
+            fold_norms(self.body)
+        for name in config.frozen:
+            self.body.network.get_submodule(name).requires_grad_(False)
+        self.fpn = FeaturePyramidNetwork(list(self.body.channels), config.channels)
+        if circular:
+            make_circular(self.fpn)
+        self.extra_level = config.extra_level
+
+    def forward(self, image: Float[Tensor, "batch 3 height width"]) -> list[Tensor]:
+        """Return feature maps (batch, channels, rows, columns), finest first."""
+        maps = self.body(image)
+        levels = OrderedDict((str(k), level) for k, level in enumerate(maps))
+        pyramid = list(self.fpn(levels).values())
+        if self.extra_level:
+            pyramid.append(pyramid[-1][:, :, ::2, ::2])
+        return pyramid
+
+    def train(self, mode: bool = True) -> "Pyramid":
+        """Set training mode, but keep the normalisations' statistics: batches are too small."""
+        super().train(mode)
+        for module in self.body.modules():
+            if isinstance(module, nn.BatchNorm2d):
+                module.eval()
+                module.requires_grad_(False)
+        return self
+
+
+def fold_norms(backbone: Backbone) -> None:
+    """Make each batch normalisation part of the convolution whose output it takes, in place.
+
+    The function computed in inference mode stays the same; the normalisations are gone.
+
+    Raises:
+        ValueError: A normalisation does not take the output of a convolution without bias.
+    """
+    pairs = _convolutions_before_norms(backbone)
+    for name, norm in list(backbone.named_modules()):
+        if not isinstance(norm, nn.BatchNorm2d):
+            continue
+        conv = pairs.get(name)
+        mean, variance = norm.running_mean, norm.running_var
+        if conv is None or conv.bias is not None or mean is None or variance is None:
+            raise ValueError(f"backbone: {name} does not follow a convolution without bias")
+        conv.weight, conv.bias = fuse_conv_bn_weights(
+            conv.weight, None, mean, variance, norm.eps, norm.weight, norm.bias
+        )
+        conv.bias.requires_grad_(True)
+        backbone.set_submodule(name, getattr(norm, "act", nn.Identity()))
+
+
+def _convolutions_before_norms(backbone: Backbone) -> dict[str, nn.Conv2d]:
+    made: list[tuple[Tensor, nn.Conv2d]] = []
+    pairs: dict[str, nn.Conv2d] = {}
+    hooks = []
+    for name, module in backbone.named_modules():
+        if isinstance(module, nn.Conv2d):
+            hooks.append(
+                module.register_forward_hook(
+                    lambda conv, _, out: made.append((out, conv))  # pyright: ignore
+                )
+            )
+        elif isinstance(module, nn.BatchNorm2d):
+
+            def note(_: nn.Module, given: tuple[Tensor, ...], name: str = name) -> None:
+                if made and made[-1][0] is given[0]:
+                    pairs[name] = made[-1][1]
+
+            hooks.append(module.register_forward_pre_hook(note))
+    training = backbone.training
+    with torch.no_grad():
+        backbone.eval()(torch.zeros(1, 3, 64, 64, device=backbone.mean.device))
+    backbone.train(training)
+    for hook in hooks:
+        hook.remove()
+    return pairs
