@@ -39,7 +39,7 @@ def draw_file(file: Path, output: Path, photo: Path | None, truth: Path | None) 
     with TemporaryDirectory(prefix="panoscene-") as name, progress_words() as progress:
         drafts = Path(name)
         with blaming(file):
-            for drawn in _pictures(scene, drafts, image=image, reference=reference):
+            for drawn in draw_pictures(scene, drafts, image=image, reference=reference):
                 progress(f"drew {drawn}")
         # all are there: nobody finds some of them after an error
         for draft in sorted(drafts.iterdir()):
@@ -48,14 +48,25 @@ def draw_file(file: Path, output: Path, photo: Path | None, truth: Path | None) 
     return 0
 
 
-def _pictures(
+def draw_pictures(
     scene: Scene,
     output: Path,
     *,
     image: Float[Tensor, "3 height width"] | None,
     reference: Scene | None,
+    sheet: bool = True,
+    page: bool = True,
 ) -> Iterator[str]:
-    """Draw a scene and yield the names of the files as they are written."""
+    """Draw a scene and yield the names of the files as they are written.
+
+    Args:
+        scene: what to draw.
+        output: folder for the files.
+        image: the upright panorama, when there is one.
+        reference: another scene, whose boxes are outlined.
+        sheet: also draw all pictures side by side.
+        page: also write the page to look around in.
+    """
     draw_birds_eye(scene, output / "birds-eye.png", reference=reference)
     yield "birds-eye.png"
     draw_overlay(scene, output / "overlay.png", image=image, reference=reference)
@@ -66,9 +77,12 @@ def _pictures(
     view = render_view(scene, default_view(scene))
     write_image(view, output / "view.png")
     yield "view.png"
-    row = SheetRow(scene.name or "Room", scene, image=image, rendering=rendering, view=view)
-    draw_sheet([row], output / "sheet.png", reference=reference, width_px=SHEET_WIDTH)
-    yield "sheet.png"
+    if sheet:
+        row = SheetRow(scene.name or "Room", scene, image=image, rendering=rendering, view=view)
+        draw_sheet([row], output / "sheet.png", reference=reference, width_px=SHEET_WIDTH)
+        yield "sheet.png"
+    if not page:
+        return
     caption = "" if image is not None else "Rendered from the boxes."
     write_report(
         output / "report.html",

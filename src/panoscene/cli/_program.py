@@ -22,11 +22,14 @@ from panoscene.cli._commands import (
 from panoscene.cli._errors import InputError
 from panoscene.cli._eval_commands import export, report, score
 from panoscene.cli._help import explain, summarised
+from panoscene.cli._reconstruct_command import reconstruct
 from panoscene.cli._terminal import complain
+from panoscene.cli._train_commands import precompute, train
 from panoscene.cli._view_commands import draw, view
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
+    "reconstruct": reconstruct,
     "arrange": arrange,
     "relations": relations,
     "convert": convert,
@@ -35,6 +38,8 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "schema": schema,
     "bench": bench,
     "experiment": experiment,
+    "train": train,
+    "precompute": precompute,
     "eval export": export,
     "eval score": score,
     "eval report": report,
@@ -168,11 +173,14 @@ def _is_about_input(error: ValueError) -> bool:
     """Return whether an error describes a file or an option rather than a fault in the code."""
     if isinstance(error, InputError):
         return True
+    from panoscene.models import CheckpointError  # noqa: PLC0415
     from panoscene.scene import PanoramaError, SceneFormatError  # noqa: PLC0415
     from panoscene.synth.assets import AssetError  # noqa: PLC0415
     from panoscene.synth.dataset import DatasetError  # noqa: PLC0415
+    from panoscene.train import TrainError  # noqa: PLC0415
 
-    return isinstance(error, SceneFormatError | PanoramaError | AssetError | DatasetError)
+    of_files = SceneFormatError | PanoramaError | AssetError | DatasetError
+    return isinstance(error, of_files | CheckpointError | TrainError)
 
 
 def _discard_output() -> None:

@@ -1,0 +1,98 @@
+# ruff: noqa: PLC0415
+# The imports stand inside the function: help and wrong options should not wait for torch.
+"""The command that turns photos into scenes."""
+
+import math
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from panoscene.cli._errors import InputError
+from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFile, Output
+
+
+def reconstruct(
+    photos: Annotated[
+        Positional[tuple[str, ...]],
+        arg(metavar="PHOTO [PHOTO ...]", help_behavior_hint="(required)"),
+    ],
+    *,
+    output: Output,
+    camera_height: Number = 1.6,
+    edition: Literal["compact", "paper"] = "compact",
+    weights: OptionalFile = None,
+    device: Annotated[str, arg(metavar="NAME")] = "cpu",
+    steps: OptionalCount = None,
+    resolution: Count = 64,
+    no_shapes: Flag = False,
+    keep_frame: Flag = False,
+    resume: Flag = False,
+    json: Flag = False,
+) -> int:
+    """Turn 360-degree photos of rooms into 3D scenes.
+
+    The folder gets scene.json (room, objects, relations), scene.glb for other 3D programs,
+    report.html to look around in, overlay.png, birds-eye.png, render.png and view.png,
+    floorplan.svg, and reconstruction.json (times, doubts, what the arrangement improved). Several
+    photos get a folder each, named as they are. For example:
+
+        panoscene reconstruct photo.jpg -o room
+        panoscene reconstruct photos/ -o rooms --resume
+
+    A photo that cannot be used is reported and left out; the exit code is then 2.
+
+    Args:
+        photos: 2:1 panoramas (.jpg .png .webp .tif .bmp), folders of them, or quoted patterns.
+        output: Folder for the results.
+        camera_height: Metres from the floor to the camera; the whole scene scales with it.
+        edition: Of the networks: compact comes with its weights; paper needs --weights.
+        weights: Folder with the networks' weights, instead of those that come with the package.
+        device: Where the networks run: cpu, cuda, cuda:1 ...
+        steps: Steps of the arrangement's descent; 0 leaves the boxes as the networks say.
+        resolution: Of the grid in which meshes are found, from 8 to 256.
+        no_shapes: Leave out the meshes; objects are boxes.
+        keep_frame: Take photos as they are, even if the camera was tilted.
+        resume: Leave out photos whose results are there.
+        json: Print what was found as JSON.
+    """
+    if not photos:
+        raise InputError("PHOTO: found nothing, expected panoramas, folders or patterns")
+    if not 0 < camera_height < math.inf:
+        raise InputError(f"--camera-height: found {camera_height}, expected metres above 0")
+    if not 8 <= resolution <= 256:
+        raise InputError(f"--resolution: found {resolution}, expected 8 to 256")
+    if weights is not None and not weights.is_dir():
+        raise InputError(f"--weights {weights}: found no folder there")
+    from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
+    from panoscene.cli._settings import chosen_settings
+    from panoscene.pipeline import load
+
+    files = photo_files(photos)
+    photo_folders(files, output)
+    settings = None if steps == 0 else chosen_settings("default", None, steps)
+    pipeline = load(
+        edition,
+        weights=weights,
+        device=checked_device(device),
+        shapes=not no_shapes,
+        level=not keep_frame,
+        settings=settings,
+    )
+    choice = Choice(camera_height, resolution, resume)
+    return reconstruct_files(pipeline, files, output, choice, as_json=json)
+
+
+def checked_device(name: str) -> str:
+    """Return the name of a device that is there.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    import torch
+
+    try:
+        torch.zeros(1, device=name)
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"--device: found {name}, which cannot be used: {reason}") from None
+    return name

@@ -1,0 +1,91 @@
+"""The pipeline with stages that know the truth: order, replacement, doubts, frames."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor
+
+from panoscene.geometry import paired_box_iou
+from panoscene.models.layout import LayoutPrediction
+from panoscene.models.upright import UprightEstimate
+from panoscene.pipeline import Given, Pipeline
+from panoscene.scene import Detections, Panorama, Scene, select_objects
+
+from .conftest import Image, Knowing
+
+
+def test_ground_truth_through_every_stage_is_the_truth(truth: Scene, image: Tensor) -> None:
+    knowing = Knowing(truth)
+    result = Pipeline(knowing.stages())(image, truth.panorama)
+    boxes = result.scene.objects.boxes
+    # what IoU cannot tell: a laptop, 1 cm high, moves along its table
+    assert float((boxes.centre - truth.objects.boxes.centre).norm(dim=-1).max()) < 0.15
+    assert float(paired_box_iou(boxes, truth.objects.boxes).median()) > 0.9
+    assert torch.equal(result.scene.layout.floor_polygon, truth.layout.floor_polygon)
+    assert result.scene.relations is not None
+    assert knowing.asked == ["detector", "layout", "pose", "shape"]
+    assert list(result.timings) == ["upright", "detector", "layout", "pose", "arrangement", "shape"]
+    assert knowing.sizes == [(3, 512, 1024)]
+    assert result.doubts == ()
+    assert result.certificate is not None
+
+
+def test_without_arrangement_the_boxes_are_those_of_the_network(
+    truth: Scene, image: Tensor
+) -> None:
+    result = Pipeline(Knowing(truth).stages(shape=None), settings=None)(image, truth.panorama)
+    assert torch.equal(result.scene.objects.boxes.centre, truth.objects.boxes.centre)
+    assert result.certificate is None
+    assert result.scene.objects.shapes.mesh == ()
+
+
+def test_given_records_take_the_place_of_stages(truth: Scene, image: Tensor) -> None:
+    knowing = Knowing(truth)
+    given = Given(layout=truth.layout, objects=truth.objects)
+    result = Pipeline(knowing.stages(shape=None))(image, truth.panorama, given=given)
+    assert knowing.asked == []
+    assert result.layout is None
+    seen = Detections(truth.objects.bfov, truth.objects.category, truth.objects.score)
+    Pipeline(knowing.stages(shape=None))(image, truth.panorama, given=Given(detections=seen))
+    assert knowing.asked == ["layout", "pose"]
+
+
+def test_a_room_without_objects_is_a_scene_with_a_doubt(truth: Scene, image: Tensor) -> None:
+    empty = replace(truth, objects=select_objects(truth.objects, torch.zeros(0, dtype=torch.long)))
+    result = Pipeline(Knowing(empty).stages())(image, truth.panorama)
+    assert len(result.scene.objects.boxes) == 0
+    assert result.doubts == ("no object was found",)
+
+
+def test_doubts_are_told(truth: Scene, image: Tensor) -> None:
+    walls = torch.full((len(truth.layout.floor_polygon),), 0.1)
+    weak = replace(truth, layout=replace(truth.layout, wall_score=walls))
+    knowing = Knowing(weak)
+
+    def ambiguous(image: Image, *, camera_height: float | None = None) -> LayoutPrediction:
+        return replace(knowing.layout(image, camera_height=camera_height), ambiguous=True)
+
+    result = Pipeline(knowing.stages(layout=ambiguous))(image, truth.panorama)
+    assert [word in " ".join(result.doubts) for word in ("two ways", "uncertain")] == [True, True]
+
+
+@pytest.mark.parametrize(("degrees", "turned"), [(10.0, True), (0.2, False)])
+def test_a_tilted_photo_is_turned(
+    truth: Scene, image: Tensor, degrees: float, turned: bool
+) -> None:
+    tilt = math.radians(degrees)
+    c, s = math.cos(tilt), math.sin(tilt)
+    rotation = ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
+    estimate = UprightEstimate(rotation, tilt, 0.0, 0.9, 100)
+    result = Pipeline(Knowing(truth).stages(leveller=lambda image: estimate))(image, truth.panorama)
+    upright = Panorama(2, 1).upright_from_photo
+    assert result.scene.panorama.upright_from_photo == (rotation if turned else upright)
+    assert any("tilted by 10 degrees" in doubt for doubt in result.doubts) == turned
+
+
+def test_a_photo_without_a_record_is_taken_at_the_usual_height(truth: Scene, image: Tensor) -> None:
+    result = Pipeline(Knowing(truth).stages(shape=None))(image, name="room")
+    assert result.scene.panorama == Panorama(128, 64, 1.6)
+    assert result.scene.name == "room"

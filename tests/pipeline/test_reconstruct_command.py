@@ -1,0 +1,190 @@
+"""panoscene reconstruct: what it writes, what it refuses, and how it goes on."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from PIL import Image as Pillow
+
+from panoscene import pipeline as pipeline_package
+from panoscene.cli import main
+from panoscene.models import CheckpointError, shipped_weights
+from panoscene.pipeline import Pipeline
+from panoscene.sample import sample_photo_path
+from panoscene.scene import read_scene
+
+from .conftest import Knowing
+
+FILES = {
+    "scene.json",
+    "scene.glb",
+    "report.html",
+    "overlay.png",
+    "birds-eye.png",
+    "render.png",
+    "view.png",
+    "floorplan.svg",
+    "reconstruction.json",
+}
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def loaded(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Put stages that know the truth in the place of networks; gives the options of the load."""
+    options: dict[str, Any] = {}
+
+    def load(edition: str, **others: Any) -> Pipeline:
+        options.update(others, edition=edition)
+        return Pipeline(knowing.stages(shape=None), settings=others["settings"])
+
+    monkeypatch.setattr(pipeline_package, "load", load)
+    return options
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run the command in this process; gives exit code, stdout and stderr."""
+
+    def run_command(*arguments: object) -> tuple[int, str, str]:
+        code = main(["reconstruct", *(str(argument) for argument in arguments)])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run_command
+
+
+@pytest.fixture
+def photo(tmp_path: Path) -> Path:
+    """A small photo."""
+    file = tmp_path / "flat.jpg"
+    with Pillow.open(sample_photo_path()) as picture:
+        picture.resize((128, 64)).save(file)
+    return file
+
+
+def test_one_photo_becomes_a_folder_of_results(
+    loaded: dict[str, Any], run: Run, photo: Path, tmp_path: Path
+) -> None:
+    code, out, err = run(photo, "-o", tmp_path / "room", "--camera-height", 1.4, "--steps", 0)
+    assert (code, err) == (0, "")
+    assert {file.name for file in (tmp_path / "room").iterdir()} == FILES
+    scene = read_scene(tmp_path / "room" / "scene.json")
+    assert scene.name == "flat"
+    assert scene.panorama.camera_height == 1.4
+    assert scene.panorama.file == "../flat.jpg"
+    assert scene.relations is not None
+    assert "17 objects: " in out
+    assert "1 bed" in out
+    assert loaded["settings"] is None
+    assert loaded["level"] is True
+    account = json.loads((tmp_path / "room" / "reconstruction.json").read_text())
+    assert set(account["timings"]) == {"upright", "detector", "layout", "pose", "arrangement"}
+
+
+@pytest.mark.usefixtures("loaded")
+def test_a_bad_photo_does_not_stop_the_others(run: Run, photo: Path, tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    shutil.copy(photo, tmp_path / "photos" / "good.jpg")
+    (tmp_path / "photos" / "cut.jpg").write_bytes(photo.read_bytes()[:500])
+    square = tmp_path / "photos" / "square.png"
+    Pillow.new("RGB", (64, 64)).save(square)
+    code, out, err = run(tmp_path / "photos", "-o", tmp_path / "rooms", "--json", "--steps", 0)
+    assert code == 2
+    assert err.count("error: ") == 2
+    assert f"{square}: found 64 x 64 pixels" in err
+    told = {Path(entry["photo"]).stem: entry for entry in json.loads(out)}
+    assert [told[name]["ok"] for name in ("cut", "good", "square")] == [False, True, False]
+    assert [folder.name for folder in (tmp_path / "rooms").iterdir()] == ["good"]
+    assert {file.name for file in (tmp_path / "rooms" / "good").iterdir()} == FILES
+
+
+@pytest.mark.usefixtures("loaded")
+def test_resume_leaves_out_what_is_there(
+    knowing: Knowing, run: Run, photo: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "room"
+    folder.mkdir()
+    (folder / "scene.json").write_text("made before")
+    assert run(photo, "-o", folder, "--resume")[0] == 0
+    assert knowing.asked == []
+    assert (folder / "scene.json").read_text() == "made before"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--camera-height", "0"], "--camera-height: found 0"),
+        (["--resolution", "1000"], "--resolution: found 1000, expected 8 to 256"),
+        (["--device", "abacus"], "--device: found abacus"),
+        (["--weights", "nowhere"], "--weights nowhere: found no folder there"),
+        (["--steps", "-1"], "--steps: found -1"),
+    ],
+)
+@pytest.mark.usefixtures("loaded")
+def test_wrong_options_are_refused_before_anything_is_made(
+    run: Run,
+    photo: Path,
+    tmp_path: Path,
+    arguments: list[str],
+    message: str,
+) -> None:
+    code, _, err = run(photo, "-o", tmp_path / "room", *arguments)
+    assert code == 2
+    assert message in err
+    assert not (tmp_path / "room").exists()
+
+
+@pytest.mark.usefixtures("loaded")
+def test_outputs_that_cannot_be_are_refused(run: Run, photo: Path, tmp_path: Path) -> None:
+    code, _, err = run(photo, "-o", photo)
+    assert (code, "found a file, expected a folder" in err) == (2, True)
+    other = tmp_path / "other"
+    other.mkdir()
+    shutil.copy(photo, other / "flat.jpg")
+    code, _, err = run(photo, other / "flat.jpg", "-o", tmp_path / "rooms")
+    assert (code, "would both go to" in err) == (2, True)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    code, _, err = run(empty, "-o", tmp_path / "rooms")
+    assert (code, "found no photos there" in err) == (2, True)
+    assert not (tmp_path / "rooms").exists()
+
+
+def test_missing_and_damaged_weights_are_refused(run: Run, photo: Path, tmp_path: Path) -> None:
+    weights = tmp_path / "weights"
+    weights.mkdir()
+    code, _, err = run(photo, "-o", tmp_path / "room", "--weights", weights)
+    assert code == 2
+    assert str(weights / "detector.safetensors") in err
+    (weights / "detector.safetensors").write_bytes(b"none")
+    code, _, err = run(photo, "-o", tmp_path / "room", "--weights", weights)
+    assert code == 2
+    assert str(weights / "detector.safetensors") in err
+    assert not (tmp_path / "room").exists()
+
+
+def _has_weights() -> bool:
+    try:
+        for stage in ("detector", "layout", "pose"):
+            shipped_weights(stage)
+    except CheckpointError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(not _has_weights(), reason="the package has no weights yet")
+def test_the_sample_photo_becomes_a_room(run: Run, tmp_path: Path) -> None:
+    threads = torch.get_num_threads()
+    code, out, _ = run(sample_photo_path(), "-o", tmp_path / "room", "--json")
+    torch.set_num_threads(threads)
+    assert code == 0
+    [told] = json.loads(out)
+    assert told["objects"] >= 3
+    assert told["corners"] >= 4
+    assert {file.name for file in (tmp_path / "room").iterdir()} == FILES
