@@ -4,6 +4,8 @@
     panoscene experiment arrange --json > benchmarks/experiment.json
     panoscene experiment safety --json > benchmarks/safety.json
     panoscene bench score --json > benchmarks/score.json
+    panoscene bench synth --json > benchmarks/synth.json
+    python benchmarks/upright.py FOLDER-OF-A-RENDERED-SET
     python benchmarks/tables.py
 
 With --check it writes nothing and exits 1 when a table is stale.
@@ -13,6 +15,7 @@ import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 from panoscene.eval import (
     benchmark_table,
@@ -21,9 +24,18 @@ from panoscene.eval import (
     score_benchmark_table,
 )
 from panoscene.scene import CATEGORIES, MEAN_SIZE
+from panoscene.synth.dataset import plan_homes, read_recipe
+from panoscene.synth.production import synth_benchmark_table
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ("README.md", "docs/arrange.md", "docs/eval.md", "docs/scene.md")
+PAGES = (
+    "README.md",
+    "docs/arrange.md",
+    "docs/eval.md",
+    "docs/scene.md",
+    "docs/synth.md",
+    "docs/upright.md",
+)
 
 
 def tables() -> dict[str, str]:
@@ -47,7 +59,59 @@ def tables() -> dict[str, str]:
         "score": score_benchmark_table(measured["score"])
         + f"\n\nOn {scoring['processor']}, {scoring['cores']} cores.",
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
+        **upright_text(),
+        **synth_text(),
     }
+
+
+def synth_text() -> dict[str, str]:
+    """Return what rendering takes and how long the full set is; nothing before it was measured."""
+    file = ROOT / "benchmarks" / "synth.json"
+    if not file.is_file():
+        return {}
+    measured = json.loads(file.read_text())
+    machine = measured["machine"]
+    recipe = read_recipe(ROOT / "configs" / "synth" / "full.yaml")
+    whole = sum(len(home.cameras) for home in plan_homes(recipe))
+    hours = measured["panorama_s"] / 3600
+    text = (
+        f"{measured['measured_panoramas']} panoramas on {machine['processor']}, "
+        f"{machine['cores']} cores, with nothing else running. At this rate the {whole:,} of "
+        f"`full.yaml` take {whole * hours:.1f} hours, and those after the first 400 "
+        f"{(whole - 400) * hours:.1f}."
+    )
+    return {"synth": f"{synth_benchmark_table(measured)}\n\n{text}"}
+
+
+def upright_text() -> dict[str, str]:
+    """Return how exactly photos are made upright; nothing before it was measured."""
+    path = ROOT / "benchmarks" / "upright.json"
+    return {"upright": upright_table(json.loads(path.read_text()))} if path.is_file() else {}
+
+
+def upright_table(measured: dict[str, Any]) -> str:
+    """Return how exactly tilted panoramas are made upright."""
+    head = "| part | panoramas | median | 90 % | worst | more than "
+    lines = [head + f"{measured['failed_from_deg']:g} degrees |", "| --- " * 6 + "|"]
+    for split, kinds in measured["splits"].items():
+        for kind in ("rendered", "turned", "disturbed"):
+            some = kinds[kind]["all"]
+            lines.append(
+                f"| {split}, {kind} | {some['count']} | {some['median_deg']:.2f} |"
+                f" {some['p90_deg']:.2f} | {some['worst_deg']:.2f} | {some['failed_share']:.0%} |"
+            )
+    lines += ["", "| added tilt of train, turned | panoramas | median | 90 % | worst |"]
+    lines.append("| --- " * 5 + "|")
+    for tilts, some in measured["splits"]["train"]["turned"]["by_tilt_deg"].items():
+        lines.append(
+            f"| {tilts} | {some['count']} | {some['median_deg']:.2f} | {some['p90_deg']:.2f} |"
+            f" {some['worst_deg']:.2f} |"
+        )
+    machine = measured["machine"]
+    seconds = measured["splits"]["train"]["median_cpu_s"]
+    lines += ["", f"{seconds:.2f} s of processor time for 1024 x 512 pixels (median; one thread on"]
+    lines.append(f"{machine['processor']}).")
+    return "\n".join(lines)
 
 
 def categories_table() -> str:

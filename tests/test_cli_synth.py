@@ -18,6 +18,7 @@ import pytest
 from PIL import Image
 
 from panoscene.cli import main
+from panoscene.cli._synth_glb import write_scene_glb
 from panoscene.exports import read_glb
 from panoscene.scene import CATEGORIES
 from panoscene.synth.dataset import open_dataset, read_index
@@ -262,6 +263,33 @@ def test_preview(chain: Chain, tmp_path: Path) -> None:
     assert (tmp_path / "rgb-000.jpg").is_file()
     assert (tmp_path / "objects-000.jpg").is_file()
     assert list(tmp_path.glob("category-*.jpg"))
+
+
+def test_bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "index.json").touch()
+
+    def quick(
+        cache: Path, *, repeats: int, extra: object, progress: Callable[[str], None]
+    ) -> dict[str, object]:
+        assert cache == tmp_path
+        assert extra is write_scene_glb
+        progress("rendering")
+        seconds = {"panorama_s": 3.5 * repeats, "panorama_cpu_s": 12.0}
+        return {**seconds, "peak_gib": [1.5, 1.75], "processes": 2}
+
+    monkeypatch.setattr("panoscene.cli._measure_synth.run_synth_benchmark", quick)
+    command = ["bench", "synth", "--cache", tmp_path, "--repeats", 2]
+    code, out, err = run(*command, "--json")
+    assert (code, err) == (0, "rendering\n")
+    found = json.loads(out)
+    assert found["panorama_s"] == 7.0
+    assert found["machine"]["cores"] > 0
+    code, out, _ = run(*command)
+    assert code == 0
+    assert "| seconds a panorama, 2 processes | 7.00 | 8 |" in out
+    assert "1.75" in out
+    code, _, err = run("bench", "synth", "--repeats", 0)
+    assert (code, err) == (2, "error: --repeats: found 0, expected 1 or more\n")
 
 
 def test_another_recipe_is_refused(chain: Chain, tmp_path: Path) -> None:

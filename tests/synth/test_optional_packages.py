@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from panoscene.synth.assets import AssetError, CadModel, Material, close_surface
+from panoscene.synth.assets import AssetError
 from panoscene.synth.assets._decimate import decimated
 from panoscene.synth.assets._soup import Triangles
 from panoscene.synth.physics._engine import simulate
@@ -38,19 +38,6 @@ def test_settling_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None
     without(monkeypatch, "mujoco")
     with pytest.raises(ModuleNotFoundError, match=f"mujoco: {HINT}"):
         simulate([], np.zeros((0, 2)))
-
-
-def test_closing_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    without(monkeypatch, "skimage")
-    without(monkeypatch, "skimage.measure")
-    mesh = ball()
-    model = CadModel(
-        "a", "a", "", mesh.vertices.astype(np.float32), mesh.vertices.astype(np.float32),
-        np.zeros((len(mesh.vertices), 2), np.float32), mesh.faces.astype(np.int32),
-        np.zeros(len(mesh.faces), np.int16), (Material("m"),), (1.0, 1.0, 1.0),
-    )  # fmt: skip
-    with pytest.raises(AssetError, match=f"scikit-image: {HINT}"):
-        close_surface(model)
 
 
 def test_simplifying_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from panoscene.cli._options import (
+    Cache,
     Count,
     Flag,
     Number,
@@ -212,22 +213,32 @@ def schema() -> int:
     return 0
 
 
-def bench(subject: Subject, *, repeats: Count = 5, json: Flag = False) -> int:
-    """Measure how fast this machine is: the medians of several repeats.
+def bench(subject: Subject, *, repeats: Count = 5, cache: Cache = None, json: Flag = False) -> int:
+    """Measure how fast this machine is, in several repeats.
 
     For arrange: one scene of 20 objects, a batch of 64 of them, one of 200 objects, and how soon
     the default preset is better than the released one at its end. Takes about a minute.
 
-    For score: 500 scenes of 20 objects from disk to every metric. Takes some minutes. For example:
+    For score: 500 scenes of 20 objects from disk to every metric. Takes some minutes.
+
+    For synth: seconds and memory of rendering panoramas of the full set with two processes, each
+    of which makes one home first and then as many as there are repeats. Takes about ten minutes
+    and the models of panoscene synth assets. For example:
 
         panoscene bench arrange
         panoscene bench arrange --repeats 3 --json | jq .scene_20_ms
+        panoscene bench synth --json | jq .panorama_s
 
     Args:
         subject: What to measure.
-        repeats: How often each measurement is repeated; the median counts.
+        repeats: How often each measurement is repeated; the median counts, the mean for synth.
+        cache: For synth, the folder of the models; where panoscene synth assets puts them without.
         json: Print the figures and the machine they are from as JSON.
     """
+    if subject == "synth":
+        from panoscene.cli._measure_synth import run_synth_bench
+
+        return run_synth_bench(cache, repeats, as_json=json)
     from panoscene.cli._measure import run_bench
 
     return run_bench(subject, repeats, as_json=json)

@@ -40,4 +40,7 @@ Number = Annotated[float, arg(metavar="X"), _REAL]
 OptionalNumber = Annotated[float | None, arg(metavar="X", help_behavior_hint=""), _REAL]
 Flag = Annotated[bool, arg(help_behavior_hint="")]
 Trial = Annotated[Positional[Literal["arrange", "safety"]], arg(metavar="{arrange,safety}")]
-Subject = Annotated[Positional[Literal["arrange", "score"]], arg(metavar="{arrange,score}")]
+Subject = Annotated[
+    Positional[Literal["arrange", "score", "synth"]], arg(metavar="{arrange,score,synth}")
+]
+Cache = Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")]

@@ -18,7 +18,6 @@ from panoscene.synth.dataset import (
     CHECKS,
     SET_CHECKS,
     Layer,
-    category_sheet,
     check_dataset,
     data_card,
     dataset_statistics,
@@ -26,6 +25,7 @@ from panoscene.synth.dataset import (
     export_crops,
     export_horizonnet,
     open_dataset,
+    write_category_sheets,
     write_contact_sheets,
 )
 from panoscene.synth.production import Models
@@ -103,11 +103,7 @@ def run_preview(folder: Path, output: Path, each: int) -> int:
             progress(f"contact sheets: {layer}")
             sheets += len(write_contact_sheets(folder, output, layer=layer, each=each))
         progress("a sheet for each category")
-        for category in CATEGORIES:
-            sheet = category_sheet(folder, category)
-            if sheet is not None:
-                sheet.save(output / f"category-{category}.jpg", quality=88)
-                sheets += 1
+        sheets += len(write_category_sheets(folder, output))
     note(f"wrote {output}: {CARD} and {sheets} sheets")
     return 0
 

@@ -8,12 +8,11 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
-from panoscene.cli._options import Count, Flag, OptionalCount, Output
+from panoscene.cli._options import Cache, Count, Flag, OptionalCount, Output
 
 Sources = Annotated[
     Positional[tuple[Path, ...]], arg(metavar="[SOURCE ...]", help_behavior_hint="")
 ]
-Cache = Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")]
 Folder = Annotated[Positional[Path], arg(metavar="DIR")]
 Format = Annotated[
     Positional[Literal["coco", "horizonnet", "crops"]], arg(metavar="{coco,horizonnet,crops}")

@@ -158,6 +158,8 @@ def _joined_objects(parts: Sequence[Objects]) -> Objects:
     if any(part.shapes.mesh for part in parts):
         padded = [part.shapes.mesh or (None,) * len(part.boxes) for part in parts]
         meshes = tuple(mesh for part in padded for mesh in part)
+    told = all(part.shapes.source for part in parts if len(part.boxes))
+    sources = tuple(source for part in parts for source in part.shapes.source) if told else ()
     return Objects(
         boxes=OrientedBoxes(
             torch.cat([part.boxes.centre for part in parts]),
@@ -170,7 +172,7 @@ def _joined_objects(parts: Sequence[Objects]) -> Objects:
         distance_score=torch.cat([part.distance_score for part in parts]),
         yaw_score=torch.cat([part.yaw_score for part in parts]),
         id=tuple(name for part in parts for name in part.id),
-        shapes=Shapes(code=torch.cat(codes) if codes else None, mesh=meshes),
+        shapes=Shapes(code=torch.cat(codes) if codes else None, mesh=meshes, source=sources),
     )
 
 

@@ -72,6 +72,10 @@ CHAIR = model_of(
 )
 CARPET = model_of("carpet", [((-1, -0.7, 0), (1, 0.7, 0.01))])
 PICTURE = model_of("picture", [((-0.4, -0.02, -0.3), (0.4, 0.02, 0.3))])
+HOOD = model_of(
+    "range_hood", [((-0.15, -0.2, 0), (0.15, 0.07, 0.8)), ((-0.3, -0.2, 0.05), (0.3, 0.2, 0.054))]
+)
+"""With a pane at its lower end that is too thin to be seen edge-on."""
 VASE = model_of("", [((-0.1, -0.1, 0), (0.1, 0.1, 0.3))])
 
 
@@ -237,7 +241,7 @@ def photograph() -> Callable[..., RenderedPanorama]:
 @pytest.fixture(scope="session")
 def library() -> dict[str, CadModel]:
     """Return the models of the home by id."""
-    return {m.id: m for m in (SOFA, TABLE, LAMP, CHAIR, CARPET, PICTURE, VASE)}
+    return {m.id: m for m in (SOFA, TABLE, LAMP, CHAIR, CARPET, PICTURE, HOOD, VASE)}
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,11 @@ from panoscene.synth.dataset import (
     open_dataset,
     read_index,
 )
-from panoscene.synth.dataset._checks import Loaded, _largest_gap
+from panoscene.synth.dataset._loaded import Loaded
+from panoscene.synth.dataset._point_checks import _largest_gap, check_points
+from panoscene.synth.render import PlacedModel
+
+from .conftest import CAMERA, box_home, pose
 
 
 @pytest.fixture(scope="module", params=["taken", "tilted"])
@@ -212,6 +216,36 @@ def test_coarse_pictures_may_end_farther_from_a_face():
     distance = np.full(2, 1.0)
     assert _largest_gap(points, eye, half, distance, 1024) == pytest.approx(0.06, abs=1e-9)
     assert _largest_gap(points, eye, half, distance, 256) is None
+
+
+@pytest.fixture(scope="module")
+def edge_on(photograph, library) -> Loaded:
+    """A hood whose pane is at the height of the camera, and falls between the pixels."""
+    scene = replace(
+        box_home(), placed=(PlacedModel(library["test/range_hood"], pose(2, 3.8, 1.948, np.pi), 1),)
+    )
+    panorama = label_panorama(scene, photograph(scene, replace(CAMERA, width=640, height=320)))
+    rendered = panorama.rendered
+    return Loaded(
+        "edge on", panorama.scene, panorama.labels, rendered.rgb,
+        rendered.distance.astype(np.float64), rendered.instance, panorama.semantic.astype(np.int32),
+        library,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("with_meshes", [True, False])
+def test_thin_parts_seen_edge_on_are_let_pass_but_no_larger_boxes(edge_on, with_meshes: bool):
+    panorama = edge_on if with_meshes else replace(edge_on, library=None)
+    names = [label.category for label in panorama.labels.objects]
+    k = names.index("range_hood")
+    hood, found = panorama.labels.objects[k], panorama.object_pixels
+    mine = slice(found.start[k], found.start[k + 1])
+    points = found.eye[k] + found.ray[mine] * found.distance[mine, None]
+    assert _largest_gap(points, found.eye[k], found.half[k], found.distance[mine], 640) is not None
+    assert check_points(panorama) == []
+    wide, deep, high = hood.box.size
+    (problem,) = check_points(with_box(panorama, hood.id, size=(wide, deep + 0.3, high)))
+    assert "before a face" in problem
 
 
 def test_scenes_without_relations_are_caught(good: Loaded):

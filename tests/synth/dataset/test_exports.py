@@ -2,14 +2,17 @@
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from panoscene.geometry import boundary_from_layout
 from panoscene.scene import CATEGORIES
 from panoscene.synth.dataset import (
+    PanoramaItem,
     category_sheet,
     contact_sheet,
     data_card,
@@ -20,6 +23,7 @@ from panoscene.synth.dataset import (
     export_horizonnet,
     horizonnet_corners,
     open_dataset,
+    write_category_sheets,
     write_contact_sheets,
     write_data_card,
 )
@@ -116,6 +120,16 @@ def test_the_card_has_every_category(small_set: Path):
     assert write_data_card(small_set).read_text() == card
 
 
+def test_the_card_lists_the_files_that_are_there(small_set: Path, tmp_path: Path):
+    root = tmp_path / "set"
+    shutil.copytree(small_set, root)
+    first = open_dataset(root)[0].folder
+    listed = {line.split("`")[1] for line in data_card(root).splitlines() if line[:3] == "| `"}
+    assert listed == {path.name for path in first.iterdir()}
+    (first / "scene.glb").write_bytes(b"")
+    assert "| `scene.glb` |" in data_card(root)
+
+
 @pytest.mark.parametrize("layer", ["rgb", "objects", "distance", "semantic"])
 def test_contact_sheets_show_every_panorama(small_set: Path, layer):
     sheet = contact_sheet(small_set, layer=layer, columns=2, width=128)
@@ -142,3 +156,20 @@ def test_category_sheets_mark_the_front(small_set: Path):
     assert category_sheet(small_set, "piano") is None
     with pytest.raises(ValueError, match="throne"):
         category_sheet(small_set, "throne")
+
+
+def test_sheets_of_all_categories_are_those_of_each(small_set: Path, tmp_path: Path, monkeypatch):
+    reads: list[str] = []
+    labels = PanoramaItem.labels
+    monkeypatch.setattr(
+        PanoramaItem, "labels", lambda item: reads.append(item.name) or labels(item)
+    )
+    files = write_category_sheets(small_set, tmp_path, count=2, size=64)
+    assert len(reads) == len(open_dataset(small_set))
+    shown = dataset_statistics(small_set)["categories"]
+    assert {f.stem.removeprefix("category-") for f in files} <= {c for c, n in shown.items() if n}
+    with Image.open(tmp_path / "category-chair.jpg") as written:
+        sheet = category_sheet(small_set, "chair", count=2, size=64)
+        assert sheet is not None
+        assert written.size == sheet.size
+        assert np.abs(np.asarray(written, float) - np.asarray(sheet, float)).mean() < 8

@@ -120,6 +120,16 @@ def test_a_killed_run_goes_on_where_it_was(small, tmp_path: Path):
     assert next_jobs(tmp_path, limit=1) == ()
 
 
+def test_a_set_goes_on_with_the_models_that_it_was_begun_with(tmp_path: Path):
+    begun = begin_dataset(tmp_path, recipe_of(), unseen_bases=["b", "a", "b"])
+    assert begun.unseen_bases == ("a", "b")
+    assert begin_dataset(tmp_path, recipe_of(), unseen_bases=("a", "b")) == begun
+    assert begin_dataset(tmp_path, recipe_of()) == begun
+    for others in ((), ("a", "c")):
+        with pytest.raises(DatasetError, match="other models"):
+            begin_dataset(tmp_path, recipe_of(), unseen_bases=others)
+
+
 def test_another_recipe_needs_another_folder(tmp_path: Path):
     begin_dataset(tmp_path, recipe_of())
     with pytest.raises(DatasetError, match="another recipe"):

@@ -30,7 +30,7 @@ def test_textures_are_square_seeded_and_read_only(kind: str) -> None:
     assert texture.roughness.shape == (64, 64)
     assert texture.normal.shape == (64, 64, 3)
     assert 0.05 <= texture.metres <= 3.0
-    again = _made.__wrapped__(kind, 5, 64)
+    again = _made(kind, 5, 64)
     np.testing.assert_array_equal(texture.colour, again.colour)
     np.testing.assert_array_equal(texture.normal, again.normal)
     with pytest.raises(ValueError, match="read-only"):

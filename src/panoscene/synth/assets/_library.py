@@ -11,14 +11,14 @@ from ._records import CadModel, Placement
 from ._shape_files import ShapeSamples, read_shape, shape_file
 from ._split import Part, split_models
 
-_LOADED = 96
+_LOADED = 48
 """Models kept in memory."""
 
 
 class ModelLibrary:
     """Furniture models by id.
 
-    Listings come from the index; a mesh is read when it is first asked for, and the last 96 stay
+    Listings come from the index; a mesh is read when it is first asked for, and the last 48 stay
     in memory.
 
     Args:

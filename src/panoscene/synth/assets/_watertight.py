@@ -7,7 +7,6 @@ from jaxtyping import Bool, Float32, Float64, Int64
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from ._errors import AssetError
 from ._records import CadModel
 
 RESOLUTION = 160
@@ -56,15 +55,9 @@ def close_surface(model: CadModel, resolution: int = RESOLUTION) -> ClosedSurfac
     Args:
         model: To close.
         resolution: Voxels along the longest side.
-
-    Raises:
-        AssetError: The optional package ``scikit-image`` is missing.
     """
-    try:
-        from skimage.measure import marching_cubes  # noqa: PLC0415 - optional
-    except ImportError as error:
-        hint = "watertight meshes need scikit-image: pip install 'panoscene[synth]'"
-        raise AssetError("scikit-image", hint) from error
+    from skimage.measure import marching_cubes  # noqa: PLC0415 (it takes a second)
+
     extent = np.ptp(model.vertices, axis=0).astype(np.float64)
     scale = float(extent.max())
     thick = np.maximum(extent, _MIN_THICKNESS) / scale

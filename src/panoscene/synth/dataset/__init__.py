@@ -2,6 +2,8 @@
 
 from ._card import data_card as data_card
 from ._card import write_data_card as write_data_card
+from ._category_sheets import category_sheet as category_sheet
+from ._category_sheets import write_category_sheets as write_category_sheets
 from ._check import CHECKS as CHECKS
 from ._check import SET_CHECKS as SET_CHECKS
 from ._check import check_dataset as check_dataset
@@ -44,7 +46,6 @@ from ._semantic import SEMANTIC_NAMES as SEMANTIC_NAMES
 from ._semantic import UNLABELLED as UNLABELLED
 from ._semantic import semantic_value as semantic_value
 from ._sheets import Layer as Layer
-from ._sheets import category_sheet as category_sheet
 from ._sheets import contact_sheet as contact_sheet
 from ._sheets import write_contact_sheets as write_contact_sheets
 from ._statistics import dataset_statistics as dataset_statistics

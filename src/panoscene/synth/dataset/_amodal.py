@@ -3,11 +3,13 @@
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from jaxtyping import Bool, Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 _MARGIN = 0.01
 """Radians around the cone that holds the object."""
 _RAYS = 8000
+_NOWHERE = 1e6
+"""Metres; rays that meet nothing come back with more."""
 
 
 def whole_solid_angle(
@@ -29,17 +31,7 @@ def whole_solid_angle(
         seen: Where it is known to be visible; these count without a ray.
     """
     total = float(weight[seen].sum())
-    length = np.linalg.norm(vertices, axis=1)
-    towards = vertices / np.maximum(length, 1e-9)[:, None]
-    axis = towards.mean(axis=0)
-    axis /= max(float(np.linalg.norm(axis)), 1e-9)
-    narrowest = float((towards @ axis).min())
-    if narrowest > 0.05:  # a cone of less than 87 degrees holds all vertices, and so all faces
-        limit = np.cos(min(np.arccos(narrowest) + _MARGIN, np.pi))
-        candidates = np.flatnonzero((directions @ axis.astype(np.float32) >= limit) & ~seen)
-    else:
-        candidates = np.flatnonzero(~seen)
-    candidates = candidates[_meets_bounds(vertices, directions[candidates])]
+    candidates = _may_meet(vertices, directions, ~seen)
     if len(candidates) == 0:
         return total
     count = len(candidates)
@@ -49,6 +41,48 @@ def whole_solid_angle(
     rays = np.ascontiguousarray(directions[candidates])
     hit = world.run(np.zeros_like(rays), rays) >= 0
     return total + float(weight[candidates[hit]].sum()) * count / len(candidates)
+
+
+def points_seen_alone(
+    vertices: Float64[np.ndarray, "vertices 3"],
+    faces: Int32[np.ndarray, "faces 3"],
+    directions: Float32[np.ndarray, "n 3"],
+) -> Float64[np.ndarray, "hits 3"]:
+    """Return where the rays of pixels meet a mesh that is alone in the world.
+
+    Args:
+        vertices: Relative to the camera, in the frame of the directions.
+        faces: Seen from both sides.
+        directions: Of the pixels, of unit length.
+    """
+    candidates = _may_meet(vertices, directions, np.ones(len(directions), np.bool_))
+    rays = np.ascontiguousarray(directions[candidates])
+    if len(rays) == 0:
+        return np.zeros((0, 3))
+    world = EmbreeScene()
+    TriangleMesh(world, np.ascontiguousarray(vertices, np.float32), faces)
+    distance = world.run(np.zeros_like(rays), rays, query="DISTANCE").astype(np.float64)
+    hit = distance < _NOWHERE
+    return rays[hit].astype(np.float64) * distance[hit, None]
+
+
+def _may_meet(
+    vertices: Float64[np.ndarray, "vertices 3"],
+    directions: Float32[np.ndarray, "n 3"],
+    wanted: Bool[np.ndarray, " n"],
+) -> Int64[np.ndarray, " some"]:
+    """Return the wanted rays from the origin that may meet a mesh of these vertices."""
+    length = np.linalg.norm(vertices, axis=1)
+    towards = vertices / np.maximum(length, 1e-9)[:, None]
+    axis = towards.mean(axis=0)
+    axis /= max(float(np.linalg.norm(axis)), 1e-9)
+    narrowest = float((towards @ axis).min())
+    if narrowest > 0.05:  # a cone of less than 87 degrees holds all vertices, and so all faces
+        limit = np.cos(min(np.arccos(narrowest) + _MARGIN, np.pi))
+        candidates = np.flatnonzero((directions @ axis.astype(np.float32) >= limit) & wanted)
+    else:
+        candidates = np.flatnonzero(wanted)
+    return candidates[_meets_bounds(vertices, directions[candidates])]
 
 
 def _meets_bounds(

@@ -8,6 +8,8 @@ from panoscene.style import GROUPS, words
 
 from ._format import SPLITS
 from ._index import ATTRIBUTION, read_index
+from ._maps import ALBEDO, DISTANCE, GLB, INSTANCE, LABELS, NORMAL, SCENE, SEMANTIC
+from ._read import open_dataset
 from ._statistics import dataset_statistics
 
 CARD = "README.md"
@@ -63,7 +65,7 @@ def data_card(root: Path | str, *, statistics: dict[str, Any] | None = None) -> 
         "## Relations",
         _relation_table(found["relations"]),
         "## Files",
-        _FILES,
+        _files(root),
         "## Credits",
         f"The models' makers are named in `{ATTRIBUTION}`; their licences ask that this goes with "
         "every copy of the pictures.",
@@ -82,17 +84,32 @@ def write_data_card(root: Path | str) -> Path:
     return path
 
 
-_FILES = """\
+_FILES = {
+    "rgb.jpg": "the photo, equirectangular",
+    "rgb.png": "the photo, equirectangular",
+    SCENE: "layout of the camera's room, objects, relations (panoscene's scene format)",
+    LABELS: "camera, models and their places, visible and amodal BFoVs, occlusion, hashes",
+    DISTANCE: "16 bits: millimetres along the ray, 0 where there is nothing",
+    INSTANCE: "16 bits: the ids in `labels.json`, 0 where there is nothing",
+    SEMANTIC: "8 bits: 57 categories, 57 floor, 58 wall, 59 ceiling, 255 not labelled",
+    GLB: "the room and its objects as a model, coloured by groups, at most about 4,000 triangles "
+    "each",
+    NORMAL: "8 bits a channel: x, y, z in the photo's frame, `(value - 128) / 127`",
+    ALBEDO: "the colour of the surfaces without light",
+}
+"""What the files of a panorama are."""
+
+
+def _files(root: Path | str) -> str:
+    """Return which files a panorama has; those that not every set has are looked for."""
+    folders = [item.folder for item in open_dataset(root)[:1]]
+    always = ("rgb.jpg", SCENE, LABELS, DISTANCE, INSTANCE, SEMANTIC)
+    there = [name for name in _FILES if any((folder / name).is_file() for folder in folders)]
+    rows = [(f"`{name}`", _FILES[name]) for name in there or always]
+    return f"""\
 One folder a panorama in `panoramas/`:
 
-| file | what |
-| --- | --- |
-| `rgb.jpg` | the photo, equirectangular |
-| `scene.json` | layout of the camera's room, objects, relations (panoscene's scene format) |
-| `labels.json` | camera, models and their places, visible and amodal BFoVs, occlusion, hashes |
-| `distance.png` | 16 bits: millimetres along the ray, 0 where there is nothing |
-| `instance.png` | 16 bits: the ids in `labels.json`, 0 where there is nothing |
-| `semantic.png` | 8 bits: 57 categories, 57 floor, 58 wall, 59 ceiling, 255 not labelled |
+{_table(("file", "what"), rows)}
 
 World frame of a panorama: metres, +z up, origin on the floor under the camera, +y under the
 picture's centre column. `dataset.json` has the frozen split and the hashes."""

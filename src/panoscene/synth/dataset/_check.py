@@ -12,20 +12,14 @@ import numpy as np
 from panoscene.scene import SceneFormatError
 from panoscene.synth.assets import CadModel
 
-from ._checks import (
-    Loaded,
-    check_distance,
-    check_holes,
-    check_masks,
-    check_mirrored,
-    check_points,
-    check_relations,
-)
+from ._checks import check_distance, check_holes, check_mirrored, check_relations
 from ._errors import DatasetError
 from ._index import panorama_names
 from ._label import label_hash
+from ._loaded import Loaded
 from ._maps import DISTANCE, INSTANCE, LABELS, MILLIMETRES, SEMANTIC, read_map, read_rgb
 from ._picture_checks import check_alignment, check_exposure, check_seam
+from ._point_checks import check_masks, check_points
 from ._read import PanoramaItem, SynthDataset, open_dataset
 from ._write import file_hash, scene_text
 

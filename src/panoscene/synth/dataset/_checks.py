@@ -1,20 +1,17 @@
 """What is checked of one panorama. Each check returns what is wrong, nothing when all is well."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Float64, Int32, UInt8
 
-from panoscene.scene import Relations, Scene, relations_from_boxes
+from panoscene.scene import Relations, relations_from_boxes
 from panoscene.synth.assets import CadModel
 
-from ._format import ObjectLabel, PanoramaLabels
+from ._format import ObjectLabel
 from ._label import boxes_record
-from ._pixels import pixel_directions, pixel_solid_angle
-from ._semantic import UNLABELLED, semantic_value
+from ._loaded import Loaded
+from ._pixels import pixel_solid_angle
 from ._things import Box, moved, tight_box
 
 _MILLIMETRE = 0.001
@@ -22,59 +19,6 @@ _RELATIONS = (
     "touching", "touching_wall", "on_floor", "under_ceiling", "inside_room", "farther_than",
     "relative_yaw", "relative_yaw_wall",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """A panorama as it was read from disk, for the checks."""
-
-    name: str
-    scene: Scene
-    labels: PanoramaLabels
-    rgb: UInt8[np.ndarray, "height width 3"]
-    distance: Float64[np.ndarray, "height width"]
-    """Metres."""
-    instance: Int32[np.ndarray, "height width"]
-    semantic: Int32[np.ndarray, "height width"]
-    library: Mapping[str, CadModel] | None = None
-    """Models by id, for checks against the meshes."""
-
-    @cached_property
-    def upright(self) -> Float64[np.ndarray, "3 3"]:
-        """Rotation from the photo's directions to the world's."""
-        return np.array(self.scene.panorama.upright_from_photo)
-
-    @cached_property
-    def directions(self) -> Float64[np.ndarray, "height width 3"]:
-        """Unit directions of the pixels in the world frame."""
-        return pixel_directions(*self.instance.shape) @ self.upright.T
-
-    @property
-    def eye(self) -> Float64[np.ndarray, "3"]:
-        """The camera in the world frame."""
-        return np.array([0.0, 0.0, self.scene.panorama.camera_height])
-
-    @cached_property
-    def object_pixels(self) -> "ObjectPixels":
-        """Pixels of the labelled objects in their boxes' frames."""
-        return _object_pixels(self)
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectPixels:
-    """The pixels of all labelled objects, sorted by object; object k has those from start[k]."""
-
-    start: np.ndarray
-    owner: np.ndarray
-    eye: np.ndarray
-    """The camera in each object's frame."""
-    half: np.ndarray
-    """Half sizes of the boxes."""
-    ray: np.ndarray
-    """Directions of the pixels, in the frames of their objects."""
-    distance: np.ndarray
-    flat: np.ndarray
-    """Place of each pixel in the picture, row by row."""
 
 
 def check_distance(panorama: Loaded) -> list[str]:
@@ -128,55 +72,6 @@ def check_holes(panorama: Loaded) -> list[str]:
     return problems
 
 
-def check_masks(panorama: Loaded) -> list[str]:
-    """Look for mask pixels outside the projection of their object's box."""
-    found = panorama.object_pixels
-    half = found.half[found.owner] + 0.01
-    ray = np.where(np.abs(found.ray) < 1e-12, 1e-12, found.ray)
-    near = (-half - found.eye[found.owner]) / ray
-    far = (half - found.eye[found.owner]) / ray
-    enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)
-    outside = ~((enter <= leave) & (leave >= 0))
-    problems = [
-        f"{label.id}: {share:.1%} of its mask is outside the projection of its box"
-        for label, share in zip(panorama.labels.objects, _means(outside, found.start), strict=True)
-        if share > 0.01
-    ]
-    counts = np.diff(found.start)
-    problems += [
-        f"{label.id}: {count} pixels in instance.png, {label.pixels} in labels.json"
-        for label, count in zip(panorama.labels.objects, counts, strict=True)
-        if count != label.pixels
-    ]
-    return problems + _semantic_problems(panorama)
-
-
-def check_points(panorama: Loaded) -> list[str]:
-    """Compare boxes with the points of their objects that the distance map gives.
-
-    All points must be in the box. And of an object that nothing hides, the outermost point on
-    each side that faces the camera is in sight, so there the points must reach the box's face.
-    """
-    found = panorama.object_pixels
-    points = found.eye[found.owner] + found.ray * found.distance[:, None]
-    slack = 0.01 + 2 * _MILLIMETRE
-    outside = np.any(np.abs(points) > found.half[found.owner] + slack, axis=1)
-    shares = _means(outside, found.start)
-    problems = []
-    for k, label in enumerate(panorama.labels.objects):
-        if shares[k] > 0.01:
-            problems.append(f"{label.id}: {shares[k]:.1%} of its points are outside its box")
-        elif _is_clear(label):
-            mine = slice(found.start[k], found.start[k + 1])
-            gap = _largest_gap(
-                points[mine], found.eye[k], found.half[k], found.distance[mine],
-                panorama.instance.shape[1],
-            )  # fmt: skip
-            if gap is not None:
-                problems.append(f"{label.id}: its points end {gap:.2g} m before a face of its box")
-    return problems
-
-
 def check_relations(panorama: Loaded) -> list[str]:
     """Compare relations with those recomputed from boxes, and boxes with the meshes."""
     scene = panorama.scene
@@ -227,78 +122,6 @@ def check_mirrored(panorama: Loaded) -> list[str]:
     if wrong > 0.1 * (right + wrong):
         return [f"{wrong} of {right + wrong} objects are nearer to the mirrored place of their box"]
     return []
-
-
-def _object_pixels(panorama: Loaded) -> ObjectPixels:
-    objects = panorama.labels.objects
-    place = np.full(65536, -1, np.int64)
-    for k, label in enumerate(objects):
-        place[label.instance] = k
-    flat = np.flatnonzero(place[panorama.instance.reshape(-1)] >= 0)
-    owner = place[panorama.instance.reshape(-1)[flat]]
-    order = np.argsort(owner, kind="stable")
-    flat, owner = flat[order], owner[order]
-    start = np.searchsorted(owner, np.arange(len(objects) + 1))
-    yaw = np.array([label.box.yaw for label in objects])
-    centre = np.array([label.box.centre for label in objects]).reshape(-1, 3)
-    half = np.array([label.box.size for label in objects]).reshape(-1, 3) / 2
-    cos, sin, zero = np.cos(yaw), np.sin(yaw), np.zeros(len(objects))
-    turn = np.stack(
-        [np.stack([cos, sin, zero], -1), np.stack([-sin, cos, zero], -1),
-         np.stack([zero, zero, zero + 1], -1)], axis=1
-    )  # fmt: skip
-    eye = np.einsum("nij,nj->ni", turn, panorama.eye - centre)
-    rays = panorama.directions.reshape(-1, 3)[flat]
-    local = np.einsum("pij,pj->pi", turn[owner], rays)
-    return ObjectPixels(start, owner, eye, half, local, panorama.distance.reshape(-1)[flat], flat)
-
-
-def _means(values: np.ndarray, start: np.ndarray) -> np.ndarray:
-    total = np.concatenate([[0], np.cumsum(values)])
-    return (total[start[1:]] - total[start[:-1]]) / np.maximum(np.diff(start), 1)
-
-
-def _is_clear(label: ObjectLabel) -> bool:
-    """Return whether an object is seen well enough that its faces can be checked."""
-    return (
-        label.in_scene
-        and label.occlusion < 0.02
-        and label.pixels >= 300
-        and not {"zenith", "nadir"} & set(label.truncated)
-    )
-
-
-def _largest_gap(
-    points: np.ndarray, eye: np.ndarray, half: np.ndarray, distance: np.ndarray, columns: int
-) -> float | None:
-    """Return how far points end before a face that looks at the camera, None if near enough.
-
-    Thin tips fall between pixels: a tenth of the size and two pixels are let pass.
-    """
-    pixel = 2 * np.pi / columns * float(np.median(distance))
-    allowed = 0.02 + 0.2 * half + 2 * pixel
-    gap = np.where(
-        eye > half, half - points.max(axis=0),
-        np.where(eye < -half, points.min(axis=0) + half, 0.0),
-    )  # fmt: skip
-    return float(gap.max()) if (gap > allowed).any() else None
-
-
-def _semantic_problems(panorama: Loaded) -> list[str]:
-    table = np.full(65536, -1)
-    table[0] = UNLABELLED
-    for label in panorama.labels.objects:
-        table[label.instance] = semantic_value(label.category)
-    for part in panorama.labels.structure:
-        table[part.instance] = semantic_value(part.kind)
-    expected = table[panorama.instance]
-    problems = []
-    if (expected < 0).any():
-        problems.append(f"{(expected < 0).sum()} pixels have ids that labels.json does not list")
-    differing = float(((expected != panorama.semantic) & (expected >= 0)).mean())
-    if differing:
-        problems.append(f"semantic.png differs from the instances in {differing:.2%} of its pixels")
-    return problems
 
 
 def _mesh_boxes(

@@ -78,7 +78,7 @@ class ModelCredit(Format):
 
 
 def begin_dataset(
-    root: Path | str, recipe: Recipe, *, unseen_bases: Iterable[str] = ()
+    root: Path | str, recipe: Recipe, *, unseen_bases: Iterable[str] | None = None
 ) -> DatasetIndex:
     """Write dataset.json of a new set, or return that of one that was begun with this recipe.
 
@@ -87,18 +87,26 @@ def begin_dataset(
     Args:
         root: Folder of the set; made if it is not there.
         recipe: What it will be.
-        unseen_bases: Base models that training homes do not have.
+        unseen_bases: Base models that training homes do not have; a set that was begun must have
+            the same ones. None has none, or those of the set.
 
     Raises:
-        DatasetError: The folder holds a set of another recipe, or other files.
+        DatasetError: The folder holds a set of another recipe or other models, or other files.
     """
     folder = Path(root)
     folder.mkdir(parents=True, exist_ok=True)
+    unseen = tuple(sorted(set(unseen_bases or ())))
     if (folder / INDEX).is_file():
         index = read_index(folder)
         if index.recipe != recipe:
             raise DatasetError(
                 folder / INDEX, "found a set of another recipe, expected the same or a new folder"
+            )
+        if unseen_bases is not None and index.unseen_bases != unseen:
+            raise DatasetError(
+                folder / INDEX,
+                "found a set begun with other models, expected the same folder of models: its "
+                "training homes might get shapes that are kept for test-unseen",
             )
         _remove_partial(folder)
         return index
@@ -112,7 +120,7 @@ def begin_dataset(
         recipe=recipe,
         planned=sum(len(job.cameras) for job in jobs),
         homes=tuple(HomeEntry(home=job.home, seed=job.seed, split=job.split) for job in jobs),
-        unseen_bases=tuple(sorted(set(unseen_bases))),
+        unseen_bases=unseen,
     )
     _write_index(folder, index)
     return index

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._checks import Loaded
+from ._loaded import Loaded
 
 _SHIFT = 5
 """Columns by which pictures and labels are moved against each other."""

@@ -1,4 +1,4 @@
-"""Contact sheets: many panoramas, or many objects of one category, in one picture."""
+"""Contact sheets: many panoramas in one picture."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -7,20 +7,11 @@ from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
-import torch
 from jaxtyping import UInt8
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
-from panoscene.geometry import (
-    OrientedBoxes,
-    box_corners,
-    perspective_directions,
-    pixel_from_direction,
-    pixel_in_perspective,
-    sample_panorama,
-)
-from panoscene.scene import Scene, category_index, write_atomically
-from panoscene.style import ALARM, GROUP_COLOURS, INK, PAPER, SMALL, group_of, words
+from panoscene.scene import write_atomically
+from panoscene.style import GROUP_COLOURS, INK, PAPER, SMALL, group_of, words
 
 from ._format import ObjectLabel
 from ._maps import DISTANCE, INSTANCE, MILLIMETRES, jpeg_bytes, read_map, read_rgb
@@ -31,7 +22,6 @@ Layer = Literal["rgb", "objects", "distance", "semantic"]
 _CAPTION = 22
 _LEAST_NAMED = 18
 _GAP = 6
-_EDGES = [(a, a | bit) for bit in (1, 2, 4) for a in range(8) if not a & bit]
 
 
 def contact_sheet(
@@ -63,7 +53,7 @@ def contact_sheet(
         found = repr(unknown[0]) if unknown else "none"
         raise ValueError(f"names: found {found}, expected panoramas of the set")
     tiles = [_tile(items[name], layer, width) for name in chosen]
-    return _grid(tiles, columns)
+    return grid(tiles, columns)
 
 
 def write_contact_sheets(
@@ -83,42 +73,6 @@ def write_contact_sheets(
         files.append(folder / f"{layer}-{number:03d}.jpg")
         write_atomically(files[-1], jpeg_bytes(np.asarray(sheet), 90))
     return files
-
-
-def category_sheet(
-    root: Path | str, category: str, *, count: int = 40, columns: int = 8, size: int = 200
-) -> Image.Image | None:
-    """Return views of objects of a category with their boxes, fronts in red; None without any.
-
-    Each model comes once before any comes twice. The red rectangle is the front face of the box:
-    whoever looks sees at once when a model faces the wrong way.
-
-    Args:
-        root: Folder of the set.
-        category: One of the 57.
-        count: Views at most.
-        columns: Views in a row.
-        size: Of a view, in pixels.
-
-    Raises:
-        DatasetError: A file of the set is missing or damaged.
-        ValueError: There is no such category.
-    """
-    category_index(category)
-    found = [
-        (item, label)
-        for item in open_dataset(root)
-        for label in item.labels().objects
-        if label.category == category and label.in_scene and label.occlusion < 0.6
-    ]
-    seen: dict[str, int] = {}
-    ranked = []
-    for item, label in sorted(found, key=lambda pair: pair[1].occlusion):
-        seen[label.model] = seen.get(label.model, 0) + 1
-        ranked.append((seen[label.model], item, label))
-    ranked.sort(key=lambda entry: entry[0])
-    tiles = [_object_tile(item, label, size) for _, item, label in ranked[:count]]
-    return _grid(tiles, columns) if tiles else None
 
 
 def _tile(item: PanoramaItem, layer: Layer, width: int) -> tuple[Image.Image, str]:
@@ -174,44 +128,8 @@ def _outlined(
     return image
 
 
-def _object_tile(item: PanoramaItem, label: ObjectLabel, size: int) -> tuple[Image.Image, str]:
-    scene = item.scene()
-    lon, lat, wide, high = label.bfov_amodal
-    reach = min(max(wide, high, 0.1) * 1.35, 2.4)
-    bfov = torch.tensor([lon, lat, reach, reach])
-    upright = torch.tensor(scene.panorama.upright_from_photo)
-    rays = perspective_directions(bfov, (size, size)) @ upright
-    image = item.image()
-    uv = pixel_from_direction(rays, *image.shape[-2:])
-    crop = sample_panorama(image, uv)
-    pixels = (crop * 255 + 0.5).clamp(0, 255).byte().permute(1, 2, 0).numpy()
-    picture = Image.fromarray(pixels)
-    _draw_box(picture, scene, label, bfov)
-    name = label.model.rsplit("/", 2)
-    return picture, "/".join(name[-2:])[-26:]
-
-
-def _draw_box(picture: Image.Image, scene: Scene, label: ObjectLabel, bfov: torch.Tensor) -> None:
-    box = OrientedBoxes(
-        torch.tensor(label.box.centre), torch.tensor(label.box.size), torch.tensor(label.box.yaw)
-    )
-    eye = torch.tensor([0.0, 0.0, scene.panorama.camera_height])
-    corners = box_corners(box) - eye
-    ahead = corners @ _forward(bfov)
-    uv, _ = pixel_in_perspective(corners, bfov.expand(8, 4), (picture.height, picture.width))
-    draw = ImageDraw.Draw(picture)
-    for a, b in _EDGES:
-        if min(float(ahead[a]), float(ahead[b])) > 0.05:
-            front = bool(a & 2 and b & 2)
-            ends = [tuple(uv[k].tolist()) for k in (a, b)]
-            draw.line(ends, fill=ALARM if front else PAPER, width=2 if front else 1)
-
-
-def _forward(bfov: torch.Tensor) -> torch.Tensor:
-    return perspective_directions(bfov, (1, 1))[0, 0]
-
-
-def _grid(tiles: Sequence[tuple[Image.Image, str]], columns: int) -> Image.Image:
+def grid(tiles: Sequence[tuple[Image.Image, str]], columns: int) -> Image.Image:
+    """Return pictures of one size in rows, each under its caption."""
     columns = min(columns, len(tiles))
     wide, high = tiles[0][0].size
     rows = -(-len(tiles) // columns)

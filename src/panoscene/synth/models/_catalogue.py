@@ -110,8 +110,8 @@ def make_model(kind: str, seed: int, texture_size: int = 1024) -> CadModel:
     """Return the model ``parametric/<kind>/<seed>``; other seeds are other designs.
 
     Every model is a union of closed pieces whose faces look outwards. It stands upright with its
-    front at +y, and its uv are in tiles of its materials' textures. The last hundred or so models
-    are kept in memory, so their arrays are read-only.
+    front at +y, and its uv are in tiles of its materials' textures. The last dozens of models are
+    kept in memory, so their arrays are read-only.
 
     Args:
         kind: one of ``PARAMETRIC_KINDS``.
@@ -134,7 +134,7 @@ def make_model(kind: str, seed: int, texture_size: int = 1024) -> CadModel:
     return _made(kind, int(seed), texture_size)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=64)
 def _made(kind: str, seed: int, texture_size: int) -> CadModel:
     recipe = _LABELLED.get(kind) or _DECORATION[kind]
     shop = Workshop(np.random.default_rng([seed, *kind.encode()]), texture_size)

@@ -6,7 +6,6 @@ from ._records import Models as Models
 from ._records import ObjectReport as ObjectReport
 from ._records import Outcome as Outcome
 from ._records import SettleReport as SettleReport
-from ._replace import ModelFacts as ModelFacts
 from ._replace import replace_models as replace_models
 from ._settle import settle_home as settle_home
 from ._shapes import CollisionShape as CollisionShape

@@ -2,48 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from panoscene.synth.homes import Home, Placed
+from panoscene.synth.homes import Home, ModelSummary, Placed
 
 _MOST = 0.15
 
 
-@runtime_checkable
-class ModelFacts(Protocol):
-    """What replacing asks of a model: a ``CadModel``, or what the index of a library says of it."""
-
-    @property
-    def category(self) -> str:
-        """One of the 57, or "" for decoration."""
-        ...
-
-    @property
-    def size(self) -> tuple[float, float, float]:
-        """Width, depth, height in metres."""
-        ...
-
-    @property
-    def placement(self) -> str:
-        """Where it stands or hangs."""
-        ...
-
-    @property
-    def support_height(self) -> float | None:
-        """Height above its lower edge on which things can stand; None when nothing can."""
-        ...
-
-    @property
-    def has_front(self) -> bool:
-        """False where every side is as good."""
-        ...
-
-
 def replace_models(
     home: Home,
-    models: Mapping[str, ModelFacts],
+    models: Mapping[str, ModelSummary],
     rng: np.random.Generator,
     share: float = 0.5,
 ) -> Home:
@@ -59,8 +28,8 @@ def replace_models(
 
     Args:
         home: Furnished.
-        models: Facts of the models of the home and of all that may be taken, by id; such as the
-            ``entries`` of a library, or those of its training part only.
+        models: What is known of the models of the home and of all that may be taken, by id; such
+            as the ``entries`` of a library, or those of its training part only.
         rng: Source of randomness.
         share: Probability that a model is replaced when there is another that fits.
 
@@ -106,7 +75,7 @@ def _groups(placed: Sequence[Placed]) -> list[list[int]]:
 
 
 def _fits(
-    models: Mapping[str, ModelFacts], name: str, pieces: Sequence[Placed], carries: bool
+    models: Mapping[str, ModelSummary], name: str, pieces: Sequence[Placed], carries: bool
 ) -> bool:
     new, old = models[name], models[pieces[0].model]
     same = name == pieces[0].model or new.placement != old.placement
@@ -117,7 +86,7 @@ def _fits(
 
 
 def _scale(
-    models: Mapping[str, ModelFacts], piece: Placed, name: str
+    models: Mapping[str, ModelSummary], piece: Placed, name: str
 ) -> tuple[float, float, float]:
     """Return the scale that stretches a model into the box of a piece; flat sides stay flat."""
     box = np.array(models[piece.model].size) * piece.scale
@@ -127,11 +96,11 @@ def _scale(
     return x, y, z
 
 
-def _in_its_box(models: Mapping[str, ModelFacts], piece: Placed, name: str) -> Placed:
+def _in_its_box(models: Mapping[str, ModelSummary], piece: Placed, name: str) -> Placed:
     return replace(piece, model=name, scale=_scale(models, piece, name))
 
 
-def _board(models: Mapping[str, ModelFacts], piece: Placed) -> float:
+def _board(models: Mapping[str, ModelSummary], piece: Placed) -> float:
     """Return the height above its lower edge at which things stand on a piece."""
     height = models[piece.model].support_height
     return 0.0 if height is None else height * piece.scale[2]

@@ -1,5 +1,7 @@
 """From a recipe to a data set: models, homes, photographs, on one machine or many."""
 
+from ._benchmark import run_synth_benchmark as run_synth_benchmark
+from ._benchmark import synth_benchmark_table as synth_benchmark_table
 from ._finishes import sample_finishes as sample_finishes
 from ._furnished import FurnishedHome as FurnishedHome
 from ._furnished import furnished_home as furnished_home

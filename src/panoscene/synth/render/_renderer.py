@@ -55,6 +55,8 @@ class LitScene:
     ) -> None:
         start = time.process_time()
         engine = renderer._engine
+        # Dr.Jit keeps the memory of earlier scenes, whose arrays had other sizes
+        engine.dr.flush_malloc_cache()
         lamps = lamps_of(scene, light)
         stage = build_stage(engine, triangles_of(scene, lamps), scene.panes)
         choice = light_choice(scene, lamps, light)

@@ -55,17 +55,25 @@ FLOOR_KINDS: tuple[str, ...] = tuple(k for k in _TILEABLE if k.startswith("floor
 WALL_KINDS: tuple[str, ...] = tuple(k for k in _TILEABLE if k.startswith("wall_"))
 
 
-@lru_cache(maxsize=48)
+_LARGE = 512
+"""Pixels; textures from this size on take megabytes each, and fewer are kept."""
+
+
 def _made(kind: str, seed: int, size: int) -> Texture:
     maker = _TILEABLE.get(kind) or _WHOLE[kind]
     rng = np.random.default_rng([seed, *kind.encode()])
     return finish(maker(rng, size), kind in _TILEABLE)
 
 
+_kept_large = lru_cache(maxsize=12)(_made)
+_kept_small = lru_cache(maxsize=48)(_made)
+
+
 def make_texture(kind: str, seed: int, size: int = 1024) -> Texture:
     """Return the texture of this kind and seed, ``size`` x ``size`` pixels.
 
-    Any size shows the same design as far as its pixels can; the last few dozen are kept in memory.
+    Any size shows the same design as far as its pixels can; the last dozen are kept in memory,
+    and a few dozen below 512 pixels.
 
     Args:
         kind: one of ``TEXTURE_KINDS``.
@@ -85,4 +93,5 @@ def make_texture(kind: str, seed: int, size: int = 1024) -> Texture:
         raise ValueError(f"seed is {seed}; expected 0 or more")
     if size not in (16, 32, 64, 128, 256, 512, 1024, 2048, 4096):
         raise ValueError(f"size is {size}; expected a power of two from 16 to 4096")
-    return _made(kind, int(seed), size)
+    kept = _kept_small if size < _LARGE else _kept_large
+    return kept(kind, int(seed), size)
