@@ -1,4 +1,4 @@
-# make demo    repair a disturbed sample room; pictures and report.html in demo/
+# make demo    reconstruct a sample panorama; scene, pictures and report.html in demo/
 # make test    everything CI runs: tests, doctests, lint, types, documentation
 # make lint    the checks of a commit, on all files
 # make docs    the documentation, in site/
@@ -17,8 +17,8 @@ INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check
 .PHONY: demo test lint docs clean
 
 demo: $(VENV)/.runtime-installed
-	@$(BIN)/panoscene demo -o demo
-	@echo "Look around in the repaired room: open demo/report.html in a browser."
+	@$(BIN)/panoscene reconstruct src/panoscene/sample/photo.jpg -o demo
+	@echo "Look around in the reconstructed room: open demo/report.html in a browser."
 
 test: $(VENV)/.dev-installed
 	@PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10 $(PYTEST_FLAGS)
