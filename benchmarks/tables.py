@@ -100,7 +100,7 @@ def upright_table(measured: dict[str, Any]) -> str:
                 f"| {split}, {kind} | {some['count']} | {some['median_deg']:.2f} |"
                 f" {some['p90_deg']:.2f} | {some['worst_deg']:.2f} | {some['failed_share']:.0%} |"
             )
-    lines += ["", "| added tilt of train, turned | panoramas | median | 90 % | worst |"]
+    lines += ["", "| tilt of train, turned | panoramas | median | 90 % | worst |"]
     lines.append("| --- " * 5 + "|")
     for tilts, some in measured["splits"]["train"]["turned"]["by_tilt_deg"].items():
         lines.append(
