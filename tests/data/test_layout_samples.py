@@ -29,7 +29,10 @@ from panoscene.synth.dataset import open_dataset
 
 SAMPLES = Path(__file__).parents[2] / "samples" / "synth"
 ROOM = RoomView(
-    torch.tensor([[-2.0, -1.5], [3.0, -1.5], [3.0, 1.0], [1.0, 1.0], [1.0, 4.0], [-2.0, 4.0]]).double(),
+    torch.tensor(
+        [[-2.0, -1.5], [3.0, -1.5], [3.0, 1.0], [1.0, 1.0], [1.0, 4.0], [-2.0, 4.0]],
+        dtype=torch.float64,
+    ),
     0.0,
     2.7,
     1.6,
@@ -107,7 +110,7 @@ def test_nothing_is_augmented_when_all_is_off(samples: LayoutSamples) -> None:
     one = samples.augmented(1, torch.Generator().manual_seed(5), off)
     plain = samples.plain(1)
     assert torch.equal(one.boundary, plain.boundary)
-    assert torch.allclose(one.image, plain.image, atol=0.02)
+    assert float((one.image - plain.image).abs().mean()) < 0.01
 
 
 def test_batches_have_the_targets_shapes(samples: LayoutSamples) -> None:

@@ -43,7 +43,9 @@ def chair(red_right: bool = False) -> CadModel:
     seat = trimesh.creation.box((0.5, 0.5, 0.3))
     back = trimesh.creation.box((0.5, 0.1, 0.6))
     back.apply_translation((0.0, -0.2, 0.45))
-    mesh = trimesh.util.concatenate([seat, back]).subdivide()
+    mesh = trimesh.util.concatenate([seat, back])
+    assert isinstance(mesh, trimesh.Trimesh)
+    mesh = mesh.subdivide()
     vertices = mesh.vertices - (mesh.vertices.min(0) + mesh.vertices.max(0)) / 2
     right = (vertices[mesh.faces].mean(1)[:, 0] > 0) & red_right
     size = np.ptp(vertices, axis=0).tolist()

@@ -65,20 +65,20 @@ def test_it_learns_two_panoramas_in_seconds(task: LayoutTask) -> None:
         | {"image_height": 64, "image_width": 128, "steps": 64, "frozen_stages": 0, "dropout": 0.0}
     )
     with torch.random.fork_rng(devices=[]):
-        torch.random.default_generator.manual_seed(0)
+        torch.default_generator.manual_seed(0)
         network = build_layout(config).train()
     batch = task.collate([task.samples.plain(index) for index in range(2)])
     image = torch.nn.functional.avg_pool2d(batch.image, 2)
     optimiser = torch.optim.Adam(network.parameters(), lr=0.003)
     losses: list[Tensor] = []
-    for _ in range(40):
+    for _ in range(30):
         terms = layout_losses(network(image), batch.boundary, batch.corner, boundary_weight=5.0)
         optimiser.zero_grad()
         terms["boundary"].backward()
         optimiser.step()
         losses.append(terms["boundary"].detach())
     assert bool(torch.stack(losses).isfinite().all())
-    assert float(losses[-1]) < 0.35 * float(losses[0])
+    assert float(losses[-1]) < 0.4 * float(losses[0])
 
 
 def test_samples_and_losses_fit(task: LayoutTask) -> None:

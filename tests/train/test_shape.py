@@ -29,6 +29,7 @@ def body(name: str, category: str, *boxes: tuple[tuple[float, ...], tuple[float,
         part.apply_translation(place)
         parts.append(part)
     mesh = trimesh.util.concatenate(parts)
+    assert isinstance(mesh, trimesh.Trimesh)
     vertices = mesh.vertices - (mesh.vertices.min(0) + mesh.vertices.max(0)) / 2
     size = np.ptp(vertices, axis=0).tolist()
     return CadModel(
@@ -103,7 +104,7 @@ def test_overfits_two_models(task: ShapeTask) -> None:
         head = [p for n, p in task.model.named_parameters() if task.rate(n) > 0]
         optimiser = torch.optim.AdamW(head, 5e-3)
         task.model.train()
-        for step in range(80):
+        for step in range(60):
             generator = torch.Generator().manual_seed(step)
             batch = task.collate([task.sample(k, generator) for k in range(task.sample_count())])
             loss = torch.stack(list(task.losses(task.model, batch).values())).sum()

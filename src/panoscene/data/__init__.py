@@ -1,5 +1,12 @@
 """Data for networks: targets, augmentation, samples in a reproducible order."""
 
+from ._detector_samples import DetectorAugmentation as DetectorAugmentation
+from ._detector_samples import DetectorSample as DetectorSample
+from ._detector_samples import DetectorSamples as DetectorSamples
+from ._detector_samples import LabelRules as LabelRules
+from ._detector_samples import collate_detector as collate_detector
+from ._detector_truth import SeenObjects as SeenObjects
+from ._detector_truth import seen_objects as seen_objects
 from ._draw import Draw as Draw
 from ._geometric import Motion as Motion
 from ._geometric import random_motion as random_motion

@@ -1,4 +1,4 @@
-"""Samples for the layout network: upright panoramas, stretched, rolled and mirrored, and targets."""
+"""Samples for the layout network: panoramas stretched, rolled and mirrored, and their targets."""
 
 import math
 from collections.abc import Sequence

@@ -123,7 +123,7 @@ def sampled_model(
     uniform = rng.uniform(-0.5, 0.5, (2 * _SAMPLES, 3)) * extent * SHAPE_MARGIN
     axis = np.linspace(-_GRID_REACH, _GRID_REACH, GRID_CELLS)
     nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    points = np.concatenate([near, uniform, nodes])
+    points = np.concatenate([near, uniform, nodes]).astype(np.float64)
     distance = np.asarray(KDTree(surface.vertices, balanced_tree=False).query(points, eps=0.05)[0])
     distance = np.maximum(distance, 1e-3) * np.where(surface.inside(points), -1, 1)
     ends = np.cumsum([len(near), len(uniform)])
@@ -170,7 +170,7 @@ def _lighter(
         return vertices, faces
     import fast_simplification  # noqa: PLC0415 - optional
 
-    fewer = fast_simplification.simplify(vertices, faces, target_count=_MESH_FACES)
+    fewer = fast_simplification.simplify(surface.vertices, faces, target_count=_MESH_FACES)
     light, sides = np.asarray(fewer[0], np.float32), np.asarray(fewer[1], np.int32)
     return (light, sides) if _closed(sides) else (vertices, faces)
 

@@ -1,4 +1,4 @@
-"""Samples that come with the package: a furnished room as scene.json, and a photo with its truth."""
+"""Samples that come with the package: a furnished room, and a photo with its truth."""
 
 from panoscene.sample._photo import sample_photo_path as sample_photo_path
 from panoscene.sample._photo import sample_photo_truth_path as sample_photo_truth_path

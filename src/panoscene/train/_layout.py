@@ -16,7 +16,6 @@ from panoscene.eval import LayoutRecord, layout_record, score_layout
 from panoscene.models import read_weights
 from panoscene.models.layout import (
     CONFIGS,
-    LayoutNetwork,
     LayoutPrediction,
     LayoutStage,
     build_layout,
@@ -68,9 +67,10 @@ class LayoutTask(Task):
         cached = self.options.cached
         self.samples = LayoutSamples(open_dataset(data, "train")[:], size, cached=cached)
         self.validation = LayoutSamples(open_dataset(data, "val")[:], size, cached=0)
-        self.model: LayoutNetwork = build_layout(self.network_config, imagenet=recipe.imagenet)
+        self.network = build_layout(self.network_config, imagenet=recipe.imagenet)
+        self.model = self.network
         if recipe.start is not None:
-            read_weights(recipe.start, self.model, stage="layout", edition=recipe.edition)
+            read_weights(recipe.start, self.network, stage="layout", edition=recipe.edition)
         self._seen: list[_Seen] = []
 
     def sample_count(self) -> int:
@@ -97,7 +97,7 @@ class LayoutTask(Task):
         The selection is the mean 3D IoU of the regularised and of the raw polygon.
         """
         del model
-        stage = LayoutStage(self.model)
+        stage = LayoutStage(self.network)
         chosen = self._validation_rooms(limit)
         found = [_predicted(stage, one) for one in chosen]
         records = [
@@ -112,7 +112,7 @@ class LayoutTask(Task):
     def pictures(self, model: nn.Module) -> dict[str, UInt8[np.ndarray, "height width 3"]]:
         """Return panoramas with true and found boundaries, beside the floor plans."""
         del model
-        stage = LayoutStage(self.model)
+        stage = LayoutStage(self.network)
         return {
             one.truth.name: layout_picture(one.image.numpy(), _predicted(stage, one), one.truth)
             for one in self._validation_rooms(_PICTURES)

@@ -101,7 +101,9 @@ class ShapeTask(Task):
         self.validation_crops = _crops(folder, "val")
         self.entries = self._entries()
         self.weights = ShapeWeights(near=self.options.near_weight)
-        self.model: ShapeNetwork = build_shape(self.network_config, imagenet=recipe.imagenet)
+        self.model: ShapeNetwork = build_shape(  # pyright: ignore[reportIncompatibleVariableOverride]
+            self.network_config, imagenet=recipe.imagenet
+        )
         self.views: SeenViews | None = None
         if self.options.frozen_views:
             self.views = self._seen_views()

@@ -19,5 +19,5 @@ def tiny_config() -> LayoutConfig:
 def tiny_network(tiny_config: LayoutConfig) -> LayoutNetwork:
     """Return a network with random weights that answers differently in each column."""
     with torch.random.fork_rng(devices=[]):
-        torch.random.default_generator.manual_seed(0)
+        torch.default_generator.manual_seed(0)
         return build_layout(tiny_config).eval()

@@ -75,7 +75,7 @@ def test_gradients_are_finite(tiny_config: LayoutConfig) -> None:
     generator = torch.Generator().manual_seed(2)
     signals = network(torch.rand(2, 3, 64, 128, generator=generator))
     terms = layout_losses(signals, torch.rand(2, 2, 1024), torch.rand(2, 1024))
-    sum(terms.values()).backward()
+    torch.stack(list(terms.values())).sum().backward()
     for name, parameter in network.named_parameters():
         assert (parameter.grad is not None) == parameter.requires_grad, name
         assert parameter.grad is None or bool(parameter.grad.isfinite().all()), name

@@ -47,7 +47,7 @@ def wobbly(boundary: Tensor, degrees: float, seed: int) -> Tensor:
     return boundary + error * math.radians(degrees)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     angle=st.floats(-4, 4), x=st.floats(-1.5, 0.5), y=st.floats(-1.0, 1.0),
     shape=st.sampled_from([RECTANGLE, L_ROOM]), ceiling=st.floats(2.2, 3.5),
@@ -128,7 +128,7 @@ def test_an_open_doorway_is_ambiguous() -> None:
     assert room_from_signals(through, corner).ambiguous
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 10_000), scale=st.floats(0.0, 2.0))
 def test_any_signals_give_a_valid_room(seed: int, scale: float) -> None:
     generator = torch.Generator().manual_seed(seed)
@@ -149,7 +149,6 @@ def test_any_signals_give_a_valid_room(seed: int, scale: float) -> None:
     [
         (torch.full((2, 1024), math.nan), torch.zeros(1024), 1.6, "finite"),
         (torch.zeros(2, 1000), torch.zeros(1000), 1.6, "multiple of 256"),
-        (torch.zeros(2, 1024), torch.zeros(512), 1.6, "found"),
         (torch.zeros(2, 1024), torch.zeros(1024), 0.0, "camera_height"),
     ],
 )

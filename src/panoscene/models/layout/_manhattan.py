@@ -30,13 +30,15 @@ RATIO = 1.03
 """Between places of a wall that are tried."""
 FIRST_PRICE = 4.0
 """Of a change of wall in the first room; less than a corner's, for walls are taken out later."""
+MOST_WALLS = 20
+"""Of the first room."""
 GAP = math.radians(2.0)
 """Jump of latitude from which a change of wall hides something."""
 TRIED = 3
 """Rooms with two walls less that are looked at closely."""
 MANY = 12
 """Walls above which fewer are."""
-USUAL_MISFIT = 0.6
+USUAL_MISFIT = 0.4
 """Misfit of half the columns, up to which corners have their price; above it they cost more."""
 MOST_NOISE = 4.0
 TURNS = tuple(math.radians(turn) for turn in (-2.0, 2.0, -0.7, 0.7))
@@ -133,11 +135,13 @@ def cuboid_places(
     """Return the walls of a cuboid around the camera: far quantiles of the columns' places."""
     along = evidence.ray @ axes.T * evidence.distance[:, None]
     # clockwise: front (second axis), right (first axis), back, left
-    right, left = np.quantile(along[along[:, 0] > 0, 0], part), np.quantile(
-        -along[along[:, 0] < 0, 0], part
+    right, left = (
+        np.quantile(along[along[:, 0] > 0, 0], part),
+        np.quantile(-along[along[:, 0] < 0, 0], part),
     )
-    front, back = np.quantile(along[along[:, 1] > 0, 1], part), np.quantile(
-        -along[along[:, 1] < 0, 1], part
+    front, back = (
+        np.quantile(along[along[:, 1] > 0, 1], part),
+        np.quantile(-along[along[:, 1] < 0, 1], part),
     )
     return np.array([right, -back, -left, front])
 
@@ -147,11 +151,18 @@ def first_places(
 ) -> Float[np.ndarray, " walls"] | None:
     """Return a room with rather too many walls, or None when the columns give none."""
     axis, place = _candidates(evidence, axes)
+    if not len(place):
+        return None
     facing = evidence.ray @ axes.T
     distance = place[:, None] / _nonzero(facing[:, axis].T)
     cost = column_costs(np.where(distance > 0, distance, 1e-2), evidence)
-    states = _cheapest_ring(cost, evidence)
-    change = np.nonzero(states != np.roll(states, 1))[0]
+    price = FIRST_PRICE
+    while True:
+        states = _cheapest_ring(cost, evidence, price)
+        change = np.nonzero(states != np.roll(states, 1))[0]
+        if len(change) <= MOST_WALLS:
+            break
+        price *= 2
     if len(change) < 3:
         return None
     wall = list(zip(axis.tolist(), place.tolist(), strict=True))
@@ -184,13 +195,13 @@ def _candidates(
 
 
 def _cheapest_ring(
-    cost: Float[np.ndarray, "states columns"], evidence: Evidence
+    cost: Float[np.ndarray, "states columns"], evidence: Evidence, first_price: float
 ) -> Int[np.ndarray, " columns"]:
     """Return the candidate that each column sees, around the seam (Viterbi's algorithm)."""
     states, columns = cost.shape
     step = len(evidence.corner) // columns
     corner = evidence.corner.reshape(columns, step).max(1)
-    price = FIRST_PRICE * (1 - 0.75 * np.maximum(corner, np.roll(corner, 1)))
+    price = first_price * (1 - 0.75 * np.maximum(corner, np.roll(corner, 1)))
     total = np.zeros(states)
     came = np.zeros((2 * columns, states), dtype=np.int64)
     own = np.arange(states)

@@ -81,7 +81,7 @@ class LayoutNetwork(nn.Module):
         super().__init__()
         self.config = config
         self.backbone = build_backbone(config.backbone, circular=True, imagenet=imagenet)
-        self.compress = nn.ModuleList(
+        levels = [
             HeightCompression(
                 channels,
                 widths,
@@ -92,10 +92,11 @@ class LayoutNetwork(nn.Module):
             for level, (channels, widths) in enumerate(
                 zip(self.backbone.channels, config.compression, strict=True)
             )
-        )
+        ]
+        self.compress = nn.ModuleList(levels)
         cell = nn.LSTM if config.cell == "lstm" else nn.GRU
         self.recurrent = cell(
-            sum(int(level.channels) for level in self.compress),
+            sum(level.channels for level in levels),
             config.hidden,
             num_layers=config.layers,
             dropout=config.dropout if config.layers > 1 else 0.0,
@@ -146,9 +147,11 @@ class LayoutNetwork(nn.Module):
     def _freeze(self) -> None:
         """Take the first stages of the backbone out of the training."""
         stages = self.config.frozen_stages
+        if not stages:
+            return
         frozen = ("conv_stem.", "bn1.", *(f"blocks.{stage}." for stage in range(stages - 1)))
-        for name, parameter in self.backbone.named_parameters():
-            if stages and any(f".{part}" in f".{name}" for part in frozen):
+        for name, parameter in self.backbone.network.named_parameters():
+            if name.startswith(frozen):
                 parameter.requires_grad_(False)
 
 

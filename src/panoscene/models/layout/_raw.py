@@ -5,10 +5,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from panoscene.geometry import polygon_problem
+from panoscene.geometry import polygon_problem, signed_distance_to_polygon
 
 SIMPLER = 0.01
 """Camera heights by which the drawn outline may move for fewer corners (1.6 cm)."""
+MOST_CORNERS = 64
+"""Corners above which it may move more."""
 
 
 def drawn_polygon(points: Float[Tensor, "columns 2"]) -> Float[Tensor, "corners 2"]:
@@ -23,11 +25,28 @@ def drawn_polygon(points: Float[Tensor, "columns 2"]) -> Float[Tensor, "corners 
         4
     """
     outline = shapely.Polygon(points.double().numpy())
-    simple = shapely.simplify(outline, SIMPLER, preserve_topology=True)
+    corners, tolerance = points.double(), SIMPLER
+    while True:
+        simpler = _simplified(outline, tolerance)
+        if not _is_room(simpler):
+            return corners
+        corners, tolerance = simpler, 1.5 * tolerance
+        if len(corners) <= MOST_CORNERS:
+            return corners
+
+
+def _simplified(outline: shapely.Polygon, tolerance: float) -> Float[Tensor, "corners 2"]:
+    """Return the outline with fewer corners; the first one goes when it is on a straight line."""
+    simple = shapely.simplify(outline, tolerance, preserve_topology=True)
     corners = torch.from_numpy(shapely.get_coordinates(simple)[:-1].copy())
-    # the first point stays even on a straight line
-    before, here, after = corners[-1], corners[0], corners[1]
-    across = (here - before)[0] * (after - here)[1] - (here - before)[1] * (after - here)[0]
-    if len(corners) > 4 and abs(float(across)) < SIMPLER * float((after - before).norm()):
-        corners = corners[1:]
-    return corners if polygon_problem(corners) is None else points.double()
+    to, onwards = corners[0] - corners[-1], corners[1] - corners[0]
+    across = abs(float(to[0] * onwards[1] - to[1] * onwards[0]))
+    straight = across < tolerance * float((to + onwards).norm())
+    return corners[1:] if straight and len(corners) > 4 else corners
+
+
+def _is_room(polygon: Float[Tensor, "corners 2"]) -> bool:
+    if polygon_problem(polygon) is not None:
+        return False
+    inside = signed_distance_to_polygon(torch.zeros(1, 2, dtype=polygon.dtype), polygon)
+    return float(inside[0]) < 0

@@ -17,6 +17,10 @@ from panoscene.models.layout._network import LayoutNetwork, build_layout
 from panoscene.models.layout._room import room_from_signals
 from panoscene.scene import Layout
 
+PUBLISHED_COLUMNS = 4
+"""Columns of a step in HorizonNet. Where a step gives more, they are off in a pattern that repeats
+from step to step, and the boundary is smoothed over one step."""
+
 
 @dataclass(frozen=True, slots=True)
 class LayoutPrediction:
@@ -74,7 +78,18 @@ class LayoutStage:
         if images.device.type == "cpu":
             images = images.contiguous(memory_format=torch.channels_last)
         found = self.network(images)
-        return found.boundary.float().cpu(), torch.sigmoid(found.corner.float()).cpu()
+        boundary = found.boundary.float().cpu()
+        if self.network.columns > PUBLISHED_COLUMNS:
+            boundary = _smoothed(boundary, self.network.columns // 2)
+        return boundary, torch.sigmoid(found.corner.float()).cpu()
+
+
+def _smoothed(
+    rows: Float[Tensor, "batch rows columns"], reach: int
+) -> Float[Tensor, "batch rows columns"]:
+    """Return means over neighbouring columns, around the seam."""
+    around = torch.cat((rows[..., -reach:], rows, rows[..., :reach]), dim=-1)
+    return F.avg_pool1d(around, 2 * reach + 1, stride=1)
 
 
 def resized_panorama(
@@ -87,9 +102,7 @@ def resized_panorama(
     if rows % size[0] == 0 and columns % size[1] == 0:
         return F.avg_pool2d(images, (rows // size[0], columns // size[1]))
     smaller = rows > size[0]
-    return F.interpolate(
-        images, size=size, mode="bilinear", align_corners=False, antialias=smaller
-    )
+    return F.interpolate(images, size=size, mode="bilinear", align_corners=False, antialias=smaller)
 
 
 def load_layout_stage(

@@ -18,12 +18,14 @@ NOISE = math.radians(0.8)
 """Latitude error that costs 1 in a column."""
 MOST = math.radians(5.0)
 """Latitude error beyond which a column costs no more."""
-CORNER_PRICE = 9.0
+CORNER_PRICE = 16.0
 """Of a corner without evidence."""
 EVIDENCE = 0.75
 """Part of the price that a certain corner does not pay."""
-UNEXPLAINED = 3.0
+UNEXPLAINED = 4.0
 """Price of a certain corner that the room has not."""
+SHORT, SHORT_PRICE = 0.12, 12.0
+"""Length of a wall in camera heights (19 cm) below which it costs up to so much more."""
 FAR_AWAY = 1e3
 """Distance in camera heights of a wall that a column does not meet."""
 
@@ -148,6 +150,8 @@ def room_costs(
     seen = first > 0.9 * far
     found = np.where(seen, evidence.corner[column], 0.0)
     price = (CORNER_PRICE * (1 - EVIDENCE * found)).sum(-1)
+    length = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+    price = price + SHORT_PRICE * np.maximum(1 - length / SHORT, 0.0).sum(-1)
     if len(evidence.peaks):
         apart = np.abs(column[:, :, None] - evidence.peaks)
         apart = np.minimum(apart, width - apart) + width * ~seen[..., None]
