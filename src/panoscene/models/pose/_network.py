@@ -165,7 +165,10 @@ class PoseNetwork(nn.Module):
         pixels = crops.contiguous(memory_format=torch.channels_last)
         last = self.backbone(pixels)[-1]
         flat = functional.avg_pool2d(last, self.config.pool, stride=1).flatten(1)
-        return flat if self.narrow is None else functional.silu(self.narrow(flat))
+        if self.narrow is None:
+            return flat
+        # without the norm large features push the activation to where it no longer learns
+        return functional.silu(self.narrow(functional.layer_norm(flat, flat.shape[1:])))
 
 
 def build_pose(config: PoseConfig, *, imagenet: bool | Path = False) -> PoseNetwork:
