@@ -35,6 +35,7 @@ from ._records import Panorama as Panorama
 from ._records import Relations as Relations
 from ._records import Scene as Scene
 from ._records import Shapes as Shapes
+from ._records import ShapeSource as ShapeSource
 from ._relations import RELATIVE_YAW_BINS as RELATIVE_YAW_BINS
 from ._relations import relations_from_boxes as relations_from_boxes
 from ._relations import relative_yaw_angle as relative_yaw_angle

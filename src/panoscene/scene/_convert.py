@@ -13,9 +13,9 @@ from ._categories import CATEGORIES, category_index
 from ._checks import document_problems, names_in_model, schema_problems, version_problems
 from ._errors import Problem, SceneFormatError
 from ._numbers import numbers_from_tensor, tensor_from_numbers
-from ._records import Layout, Mesh, Objects, Panorama, Scene, Shapes
+from ._records import Layout, Mesh, Objects, Panorama, Scene, Shapes, ShapeSource
 from ._relations_json import relations_from_model, relations_to_json
-from ._schema import FRAME, SCHEMA_NAME, SCHEMA_VERSION, UNITS, ObjectModel, SceneModel
+from ._schema import FRAME, SCHEMA_NAME, SCHEMA_VERSION, UNITS, ObjectModel, SceneModel, ShapeModel
 from ._triples import object_names
 
 
@@ -128,6 +128,8 @@ def _objects_to_json(objects: Objects, file: str) -> list[dict[str, Any]]:
                 "vertices": numbers_from_tensor(mesh.vertices),
                 "faces": numbers_from_tensor(mesh.faces),
             }
+        if shapes.source:
+            shape["source"] = shapes.source[k]
         if shape:
             document["shape"] = shape
         documents.append(document)
@@ -144,6 +146,7 @@ def _check_lengths(objects: Objects, n: int, file: str) -> None:
         "id": len(objects.id) or n,
         "shapes.code": n if objects.shapes.code is None else len(objects.shapes.code),
         "shapes.mesh": len(objects.shapes.mesh) or n,
+        "shapes.source": len(objects.shapes.source) or n,
     }
     problems = [
         Problem(f"objects.{name}", f"{length} entries", f"{n}, as many as categories")
@@ -230,4 +233,24 @@ def _shapes_from_models(models: list[ObjectModel], dtype: torch.dtype) -> Shapes
     return Shapes(
         code=torch.tensor(codes, dtype=dtype) if codes else None,
         mesh=meshes if any(mesh is not None for mesh in meshes) else (),
+        source=_sources(shapes),
     )
+
+
+def _sources(shapes: list[ShapeModel | None]) -> tuple[ShapeSource, ...]:
+    """Return where shapes come from; () when no object says so.
+
+    Where others do, a mesh that does not say is a model, and no mesh a box.
+    """
+    said = [None if shape is None else shape.source for shape in shapes]
+    if all(source is None for source in said):
+        return ()
+    return tuple(_source(shape) for shape in shapes)
+
+
+def _source(shape: ShapeModel | None) -> ShapeSource:
+    if shape is None:
+        return "box"
+    if shape.source is not None:
+        return shape.source
+    return "box" if shape.mesh is None else "model"

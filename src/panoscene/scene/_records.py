@@ -1,6 +1,7 @@
 """Frozen records that the stages exchange. One scene has exactly n objects and m walls."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
@@ -71,6 +72,9 @@ class Mesh:
     faces: Int64[Tensor, "faces 3"]
 
 
+ShapeSource = Literal["network", "slab", "box", "model"]
+
+
 @dataclass(frozen=True, slots=True)
 class Shapes:
     """Shapes of the n objects, as latent codes, as meshes, or both."""
@@ -79,6 +83,10 @@ class Shapes:
     """LDIF shape codes (1344 numbers in the paper's edition)."""
     mesh: tuple[Mesh | None, ...] = ()
     """One mesh for each object, or none for objects without one; () when there are no meshes."""
+    source: tuple[ShapeSource, ...] = ()
+    """Where the shape of each object comes from; () when that is not known. ``network``: predicted
+    from the photo; ``slab``: the box itself, as the object is too thin for a predicted shape;
+    ``box``: the box itself, for want of anything better; ``model``: a CAD model."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,6 +141,9 @@ class ShapeModel(Model):
     """Latent shape code; every object of the scene has one of the same length, or none has."""
     mesh: MeshModel | None = None
     """Triangle mesh."""
+    source: Literal["network", "slab", "box", "model"] | None = None
+    """Where the shape comes from: predicted; the box, as the object is thin; the box, for want of
+    anything better; or a CAD model."""
 
 
 class ObjectModel(Model):

@@ -24,6 +24,7 @@ def select_objects(objects: Objects, index: Int64[Tensor, " chosen"]) -> Objects
         shapes=Shapes(
             code=None if shapes.code is None else shapes.code[index],
             mesh=tuple(shapes.mesh[k] for k in places) if shapes.mesh else (),
+            source=tuple(shapes.source[k] for k in places) if shapes.source else (),
         ),
     )
 

@@ -124,7 +124,7 @@ def test_losses_are_finite_and_reach_every_free_parameter(small: DetectorConfig)
     image = torch.rand(2, 3, 64, 256, generator=torch.Generator().manual_seed(1))
     terms = network(image, targets)
     assert set(terms) == {"objectness", "proposal_box", "category", "box", "mask"}
-    sum(terms.values()).backward()
+    torch.stack(list(terms.values())).sum().backward()
     for name, parameter in network.named_parameters():
         if parameter.requires_grad:
             assert parameter.grad is not None, name
@@ -164,7 +164,7 @@ def test_it_learns_two_rectangles_one_at_the_seam(small: DetectorConfig) -> None
     free = [p for p in network.parameters() if p.requires_grad]
     optimiser = torch.optim.AdamW(free, 2e-3)
     for _ in range(45):
-        loss = sum(network(image, [targets]).values())
+        loss = torch.stack(list(network(image, [targets]).values())).sum()
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(free, 5.0)

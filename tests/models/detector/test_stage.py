@@ -1,20 +1,26 @@
 """The detector's stage: pasting, merging, and ground truth through it."""
 
 import math
+from pathlib import Path
 
 import pytest
 import torch
 
 from panoscene.geometry import bfov_iou
+from panoscene.models import CheckpointError
 from panoscene.models.detector import (
     DetectorConfig,
     DetectorNetwork,
     DetectorStage,
     RegionPredictions,
     detections_of,
+    load_detector_stage,
     network_picture,
 )
 from panoscene.models.detector._paste import paste_masks
+from panoscene.synth.dataset import open_dataset
+
+ROOT = Path(__file__).parents[3]
 
 
 def _found(boxes: list[list[float]], category: list[int] | None = None) -> RegionPredictions:
@@ -117,3 +123,18 @@ def test_masks_may_be_coarser_than_the_image(network: DetectorNetwork) -> None:
     found = DetectorStage(network, score_threshold=0.0, mask_height=64)(image)
     assert found.mask is not None
     assert found.mask.shape[1:] == (64, 128)
+
+
+def test_shipped_weights_find_pictures_doors_and_windows() -> None:
+    try:
+        stage = load_detector_stage()
+    except CheckpointError:
+        pytest.skip("no weights in this checkout")
+    item = open_dataset(ROOT / "samples" / "synth", "val")[0]
+    image = item.image()
+    found = stage(image)
+    assert len(found.score) > 0
+    assert found.mask is not None
+    assert found.mask.shape[1:] == image.shape[1:]
+    assert bool((found.score[:-1] >= found.score[1:]).all())
+    assert bool((found.score >= stage.score_threshold).all())

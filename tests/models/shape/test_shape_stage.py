@@ -34,11 +34,18 @@ from panoscene.scene import (
 )
 
 TINY = CONFIGS["compact"].model_copy(update={"features": 24, "hidden": 24, "crop": 64})
+FITTED = TINY.model_copy(update={"frame": "longest"})
 
 
 @pytest.fixture(name="network", scope="module")
 def fixture_network() -> ShapeNetwork:
     return build_shape(TINY).eval()
+
+
+@pytest.fixture(name="fitting", scope="module")
+def fixture_fitting() -> ShapeNetwork:
+    """Return a network whose shapes are fitted to their boxes, whatever they are."""
+    return build_shape(FITTED).eval()
 
 
 def ball_code(config: ShapeConfig, centre: tuple[float, float, float], loud: float = 1.0) -> Tensor:
@@ -62,9 +69,9 @@ def as_trimesh(mesh: Mesh | None) -> trimesh.Trimesh:
 
 
 @pytest.mark.parametrize("resolution", [32, 64, 128])
-def test_one_gaussian_is_a_ball(network: ShapeNetwork, resolution: int) -> None:
+def test_one_gaussian_is_a_ball(fitting: ShapeNetwork, resolution: int) -> None:
     code = ball_code(TINY, (0.1, 0.0, -0.2))
-    (mesh,) = extract_meshes(without_detail(network), code, resolution=resolution)
+    (mesh,) = extract_meshes(without_detail(fitting), code, resolution=resolution)
     found = as_trimesh(mesh)
     assert found.is_watertight
     assert found.is_winding_consistent
@@ -75,34 +82,49 @@ def test_one_gaussian_is_a_ball(network: ShapeNetwork, resolution: int) -> None:
     assert float((radius - 0.5).abs().max()) < 0.02
 
 
-def test_the_surface_is_where_the_field_says(network: ShapeNetwork) -> None:
-    network = without_detail(network)
+def test_the_surface_is_where_the_field_says(fitting: ShapeNetwork) -> None:
+    fitting = without_detail(fitting)
     code = torch.cat((ball_code(TINY, (0.2, 0.1, 0.0)), ball_code(TINY, (0.0, 0.0, 0.0), 0.2)))
     code = code.reshape(2, TINY.elements, -1)
     code[0, -2, :4] = torch.tensor([0.8, -0.3, 0.2, 0.4])
     code = code.flatten(1)
-    fine = extract_meshes(network, code, resolution=128)
-    coarse = extract_meshes(network, code, resolution=64)
+    fine = extract_meshes(fitting, code, resolution=128)
+    coarse = extract_meshes(fitting, code, resolution=64)
     for one, other in zip(fine, coarse, strict=True):
         first, second = as_trimesh(one), as_trimesh(other)
         assert first.is_watertight
         assert first.volume == pytest.approx(second.volume, rel=0.02)
 
 
-def test_shapes_come_in_order_and_empty_ones_are_none(network: ShapeNetwork) -> None:
+def test_shapes_come_in_order_and_empty_ones_are_none(fitting: ShapeNetwork) -> None:
     empty = torch.zeros(1, TINY.code)
     codes = torch.cat((empty, ball_code(TINY, (0.0, 0.0, 0.0)), empty))
-    found = extract_meshes(network, codes, resolution=32)
+    found = extract_meshes(fitting, codes, resolution=32)
     assert [mesh is None for mesh in found] == [True, False, True]
-    assert extract_meshes(network, codes[:0], resolution=64) == ()
+    assert extract_meshes(fitting, codes[:0], resolution=64) == ()
 
 
-def test_crumbs_are_left_out(network: ShapeNetwork) -> None:
+def test_crumbs_are_left_out(fitting: ShapeNetwork) -> None:
     code = ball_code(TINY, (0.2, 0.0, 0.0)).reshape(1, TINY.elements, -1)
     code[0, -2, :7] = torch.tensor([0.08, -0.9, 0.0, 0.0, -1.0, -1.0, -1.0])
-    (mesh,) = extract_meshes(without_detail(network), code.flatten(1), resolution=64)
+    (mesh,) = extract_meshes(without_detail(fitting), code.flatten(1), resolution=64)
     assert as_trimesh(mesh).body_count == 1
     assert as_trimesh(mesh).volume == pytest.approx(math.pi / 6, rel=0.02)
+
+
+def test_unsure_parts_come_back_where_the_box_says_so(network: ShapeNetwork) -> None:
+    code = torch.zeros(1, TINY.elements, TINY.width)
+    corners = torch.cartesian_prod(*[torch.tensor([-0.42, 0.42])] * 2)
+    for k, (x, y) in enumerate(corners.tolist()):
+        code[0, 31 - k, :4] = torch.tensor([0.4, 2 * x, 2 * y, -0.84])
+    code[0, 27, :4] = torch.tensor([0.06, 0.0, 0.0, 0.84])  # never below -0.07
+    (mesh,) = extract_meshes(without_detail(network), code.flatten(1), resolution=64)
+    assert as_trimesh(mesh).body_count == 5
+    # without it, nothing is stretched to fill the box
+    code[0, 27, 0] = 0
+    (mesh,) = extract_meshes(network, code.flatten(1), resolution=64)
+    assert as_trimesh(mesh).body_count == 4
+    assert as_trimesh(mesh).bounds[1, 2] < -0.15
 
 
 def test_other_resolutions_are_refused(network: ShapeNetwork) -> None:

@@ -32,7 +32,7 @@ class Encoder(nn.Module):
     def __init__(self, config: ShapeConfig, *, imagenet: bool = False) -> None:
         super().__init__()
         self.backbone = build_backbone(config.backbone, levels=config.levels, imagenet=imagenet)
-        channels = self.backbone.channels
+        channels = list(self.backbone.channels)
         self.places = nn.Conv2d(channels[-2], _PLACE_WIDTH, 1) if len(channels) > 1 else None
         found = channels[-1] + (_PLACE_WIDTH * _PLACES**2 if self.places is not None else 0)
         self.features = nn.Linear(found, config.features)

@@ -1,0 +1,129 @@
+"""Measures the detector on the part val of a set, with each way to see the seam.
+
+    python benchmarks/detector.py /work/pilot --weights runs/detector/weights.safetensors
+    python benchmarks/detector.py /work/pilot --seams --photos photos --pictures pictures
+    python benchmarks/detector.py /work/pilot --seams --card model_cards/detector-compact.md
+
+Writes benchmarks/detector.json: COCO's AP of masks and boxes, also of each category, recall of
+BFoVs, recall of the objects across the seam, seconds. The weights are the same for all ways; they
+were trained with the first one. Pictures of photos and of panoramas of the set go to a folder.
+"""
+
+import argparse
+import io
+import json
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import torch
+from PIL import Image
+
+from panoscene.data._detector_truth import seen_objects
+from panoscene.eval import machine_facts
+from panoscene.models import read_weights_header, shipped_weights
+from panoscene.models.detector import (
+    DetectorStage,
+    Seam,
+    build_detector,
+    load_detector_stage,
+)
+from panoscene.scene import Detections, read_panorama, upright_photo, write_atomically
+from panoscene.synth.dataset import open_dataset
+from panoscene.train._detector_card import detector_card
+from panoscene.train._detector_eval import evaluate_detector
+from panoscene.train._detector_pictures import detector_picture
+
+OUTPUT = Path(__file__).with_suffix(".json")
+DOUBTFUL = 0.02
+"""Scores from which on detections are scored: AP wants the doubtful ones, too."""
+
+
+def main() -> None:
+    """Measure and write the file and the pictures."""
+    parser = argparse.ArgumentParser(description="Measures the detector.")
+    parser.add_argument("data", type=Path, help="folder of a rendered set")
+    parser.add_argument("--weights", type=Path, default=None)
+    parser.add_argument("--split", default="val")
+    parser.add_argument("--count", type=int, default=26, help="panoramas, at most")
+    parser.add_argument("--seams", nargs="*", choices=get_args(Seam), default=list(get_args(Seam)))
+    parser.add_argument("--roll", type=float, default=0.0, help="part of a turn")
+    parser.add_argument("--photos", type=Path, default=None, help="folder of panoramas")
+    parser.add_argument("--pictures", type=Path, default=None, help="folder for pictures")
+    parser.add_argument("--card", type=Path, default=None, help="model card to write")
+    parser.add_argument("--output", type=Path, default=OUTPUT)
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    items = open_dataset(options.data, options.split)[: options.count]
+    weights = options.weights or shipped_weights("detector")
+    if options.card:
+        header = read_weights_header(weights)
+        count = len(open_dataset(options.data, "train"))
+        text = detector_card(header.metrics, header.recipe, panoramas=count)
+        write_atomically(options.card, text)
+    if options.pictures:
+        draw(weights, options.data, options.split, options.photos, options.pictures)
+    if not options.seams or not options.count:
+        return
+    result = {
+        "scores": {
+            seam: evaluate_detector(stage_of(weights, seam), items, roll=options.roll)
+            for seam in options.seams
+        },
+        "split": options.split,
+        "panoramas": len(items),
+        "roll": options.roll,
+        "set": open_dataset(options.data).info.name,
+        "machine": machine_facts(),
+    }
+    write_atomically(options.output, json.dumps(result, indent=2) + "\n")
+    for seam, scores in result["scores"].items():
+        shown = {k: round(v, 3) for k, v in scores.items() if "/" not in k}
+        print(seam, shown, flush=True)
+
+
+def stage_of(weights: Path, seam: Seam) -> DetectorStage:
+    """Return a stage that sees the seam in a way, with weights that were trained for another."""
+    stage = load_detector_stage(weights=weights, score_threshold=DOUBTFUL)
+    if seam == stage.network.config.seam:
+        return stage
+    network = build_detector(stage.network.config.model_copy(update={"seam": seam}))
+    network.load_state_dict(stage.network.state_dict())
+    return DetectorStage(network, score_threshold=DOUBTFUL)
+
+
+def draw(weights: Path, data: Path, split: str, photos: Path | None, output: Path) -> None:
+    """Write pictures of six panoramas of the set, above the truth, and of all photos."""
+    output.mkdir(parents=True, exist_ok=True)
+    stage = load_detector_stage(weights=weights)
+    items = open_dataset(data, split)
+    for item in items[:: max(1, len(items) // 6)][:6]:
+        image = upright_photo(item.image(), item.scene().panorama)
+        seen = seen_objects(item)
+        keep = ~seen.ignored
+        ones = torch.ones(int(keep.sum()))
+        truth = Detections(seen.bfov[keep], seen.category[keep], ones, seen.mask[keep])
+        save(detector_picture(image, stage(image), truth), output / f"{item.name}.png")
+    for file in sorted(photos.glob("*.jpg")) if photos else ():
+        image = small_photo(file)
+        save(detector_picture(image, stage(image)), output / f"{file.stem}.png")
+
+
+def small_photo(file: Path) -> torch.Tensor:
+    """Return a photo at 1024 x 512 pixels, RGB in [0, 1]."""
+    photo, _ = read_panorama(file)
+    small = torch.nn.functional.interpolate(
+        photo[None], (512, 1024), mode="bilinear", antialias=True
+    )
+    return small[0].clamp(0.0, 1.0)
+
+
+def save(picture: np.ndarray, file: Path) -> None:
+    """Write a picture of bytes as PNG."""
+    buffer = io.BytesIO()
+    Image.fromarray(picture).save(buffer, "PNG")
+    write_atomically(file, buffer.getvalue())
+
+
+if __name__ == "__main__":
+    main()
