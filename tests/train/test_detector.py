@@ -36,7 +36,7 @@ def task(monkeypatch: pytest.MonkeyPatch) -> DetectorTask:
         options={"validation_height": 64},
     )
     with torch.random.fork_rng(devices=[]):
-        torch.random.default_generator.manual_seed(0)
+        torch.default_generator.manual_seed(0)
         return detector_task(recipe)
 
 

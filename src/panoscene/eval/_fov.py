@@ -9,7 +9,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from panoscene.geometry import OrientedBoxes
-from panoscene.scene import Detections, Mesh, Objects, Relations, Scene, Shapes, select
+from panoscene.scene import Detections, Mesh, Objects, Relations, Scene, Shapes, ShapeSource, select
 
 FOV_DEG = (360, 180, 120, 90, 60, 30)
 """Horizontal fields of view of the paper's experiment, degrees; the first is the whole room."""
@@ -159,7 +159,9 @@ def _joined_objects(parts: Sequence[Objects]) -> Objects:
         padded = [part.shapes.mesh or (None,) * len(part.boxes) for part in parts]
         meshes = tuple(mesh for part in padded for mesh in part)
     told = all(part.shapes.source for part in parts if len(part.boxes))
-    sources = tuple(source for part in parts for source in part.shapes.source) if told else ()
+    sources: tuple[ShapeSource, ...] = ()
+    if told:
+        sources = tuple(source for part in parts for source in part.shapes.source)
     return Objects(
         boxes=OrientedBoxes(
             torch.cat([part.boxes.centre for part in parts]),

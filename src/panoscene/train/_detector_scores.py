@@ -122,8 +122,8 @@ def overlap_table(found: Detections, seen: SeenObjects, kind: str) -> Float[Tens
     if not len(found.mask) or not len(seen.mask):
         return torch.zeros(len(found.mask), len(seen.mask))
     if kind == "box":
-        boxes = [circular_boxes(masks) for masks in (found.mask, seen.mask)]
-        return box_overlaps(*boxes, float(seen.mask.shape[-1]))[1]
+        one, other = circular_boxes(found.mask), circular_boxes(seen.mask)
+        return box_overlaps(one, other, float(seen.mask.shape[-1]))[1]
     one, other = (masks.flatten(1).float() for masks in (found.mask, seen.mask))
     shared = one @ other.T
     return shared / (one.sum(1)[:, None] + other.sum(1) - shared).clamp_min(1.0)

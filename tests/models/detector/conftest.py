@@ -22,7 +22,7 @@ def small() -> DetectorConfig:
 @pytest.fixture(scope="session")
 def network(small: DetectorConfig) -> DetectorNetwork:
     with torch.random.fork_rng(devices=[]):
-        torch.random.default_generator.manual_seed(0)
+        torch.default_generator.manual_seed(0)
         made = build_detector(small).eval()
         for layer in (made.rpn.head.cls_logits, made.roi_heads.box_predictor.cls_score):
             torch.nn.init.normal_(layer.weight, std=0.3)

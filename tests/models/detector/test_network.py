@@ -154,7 +154,7 @@ def test_mask_targets_go_around_the_seam() -> None:
 @pytest.mark.train
 def test_it_learns_two_rectangles_one_at_the_seam(small: DetectorConfig) -> None:
     with torch.random.fork_rng(devices=[]):
-        torch.random.default_generator.manual_seed(0)
+        torch.default_generator.manual_seed(0)
         network = build_detector(small.model_copy(update={"width": 128})).train()
     targets = rectangle_targets([(40, 16, 72, 56), (112, 20, 144, 50)], 64, 128)
     image = torch.full((1, 3, 64, 128), 0.5)
