@@ -180,7 +180,10 @@ def card(result: dict) -> str:
         f"{100 * share:.0f} % ({name})" for name, share in right.items()
     ) + " of the rooms.", "", "## Limits", "",
         "- Trained on rendered rooms only, for minutes: a start, not the last word.",
-        "- The prices of corners in the reading were chosen on the same validation part.",
+        "- The checkpoint, the prices of corners, the usual misfit and the smoothing were chosen "
+        "on the same validation part: expect somewhat less elsewhere.",
+        "- The training was stopped, changed and resumed by hand: recipe and seed alone do not "
+        "give these weights.",
         "- The picture is small: walls beyond 8 m and steps below 20 cm are not resolved.",
         "- Read as Manhattan rooms where that fits; round and oblique walls stay as drawn.",
         "- Size comes from the camera height alone.",

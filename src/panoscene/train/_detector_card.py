@@ -83,6 +83,8 @@ def detector_card(
             "## Limits",
             "",
             "- It has seen rendered rooms only. On photos it misses more and is less sure.",
+            "- The training was stopped, changed and resumed by hand: recipe and seed alone do not "
+            "give these weights.",
             "- Large objects near the camera (wardrobes, beds, sofas) are often missed: they are "
             "rare in the training part, and the training was short.",
             "- Rare categories and objects below some 10 pixels at 1024 columns are mostly missed.",
