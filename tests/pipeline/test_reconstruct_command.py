@@ -12,7 +12,6 @@ from PIL import Image as Pillow
 
 from panoscene import pipeline as pipeline_package
 from panoscene.cli import main
-from panoscene.models import CheckpointError, shipped_weights
 from panoscene.pipeline import Pipeline
 from panoscene.sample import sample_photo_path
 from panoscene.scene import read_scene
@@ -169,16 +168,6 @@ def test_missing_and_damaged_weights_are_refused(run: Run, photo: Path, tmp_path
     assert not (tmp_path / "room").exists()
 
 
-def _has_weights() -> bool:
-    try:
-        for stage in ("detector", "layout", "pose"):
-            shipped_weights(stage)
-    except CheckpointError:
-        return False
-    return True
-
-
-@pytest.mark.skipif(not _has_weights(), reason="the package has no weights yet")
 def test_the_sample_photo_becomes_a_room(run: Run, tmp_path: Path) -> None:
     threads = torch.get_num_threads()
     code, out, _ = run(sample_photo_path(), "-o", tmp_path / "room", "--json")

@@ -5,10 +5,10 @@
 from pathlib import Path
 
 from panoscene.arrange import ArrangementSettings
-from panoscene.models import CheckpointError, Edition
+from panoscene.models import Edition
 
 from ._pipeline import Pipeline
-from ._stages import ShapeEstimator, Stages
+from ._stages import Stages
 
 
 def load(
@@ -37,6 +37,7 @@ def load(
     from panoscene.models.detector import load_detector_stage
     from panoscene.models.layout import load_layout_stage
     from panoscene.models.pose import load_pose_stage
+    from panoscene.models.shape import load_shape_stage
     from panoscene.models.upright import upright_rotation
 
     def file(stage: str) -> Path | None:
@@ -46,19 +47,7 @@ def load(
         detector=load_detector_stage(edition, file("detector"), device),
         layout=load_layout_stage(edition, file("layout"), device),
         pose=load_pose_stage(edition, file("pose"), device),
-        shape=_shape(edition, file("shape"), device) if shapes else None,
+        shape=load_shape_stage(edition, file("shape"), device) if shapes else None,
         leveller=upright_rotation if level else None,
     )
     return Pipeline(stages, settings=settings)
-
-
-def _shape(edition: Edition, weights: Path | None, device: str) -> ShapeEstimator | None:
-    """Return the shape stage, or None while the package has no weights for it."""
-    from panoscene.models.shape import load_shape_stage
-
-    try:
-        return load_shape_stage(edition, weights, device)
-    except CheckpointError:
-        if weights is not None or edition != "compact":
-            raise
-        return None
