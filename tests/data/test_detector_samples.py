@@ -42,7 +42,7 @@ def _rectangles(*boxes: tuple[int, int, int, int]) -> tuple[torch.Tensor, Labell
     count = len(boxes)
     counts = torch.ones(count, dtype=torch.bool)
     ids = torch.arange(1, count + 1, dtype=torch.int32)
-    return instances, LabelledObjects(ids, torch.arange(count), counts)
+    return instances, LabelledObjects(ids, torch.arange(count), counts, torch.zeros(count))
 
 
 def _config(seam: str) -> DetectorConfig:

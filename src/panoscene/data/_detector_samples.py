@@ -20,6 +20,15 @@ from panoscene.models.detector import (
 from panoscene.scene import CATEGORIES
 from panoscene.synth.dataset import PanoramaItem
 
+from ._detector_pasting import (
+    Pasting,
+    View,
+    donors_by_category,
+    draw_donor,
+    draw_pasted,
+    paste,
+    still_visible,
+)
 from ._geometric import Motion, random_motion
 from ._photometric import Photometric, augment_photo
 
@@ -39,6 +48,8 @@ class DetectorAugmentation(BaseModel):
     """Share that is tilted."""
     photometric: Photometric | None = Photometric()
     """Exposure, white balance, noise, blur and the like; None for none of it."""
+    pasting: Pasting | None = None
+    """Objects of other panoramas; None for none."""
 
 
 class LabelRules(BaseModel):
@@ -72,6 +83,8 @@ class LabelledObjects:
     """Index into ``CATEGORIES``."""
     counts: Bool[Tensor, " n"]
     """Whether it must be found; the others may be."""
+    occlusion: Float[Tensor, " n"]
+    """Hidden share of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +128,7 @@ class DetectorSamples:
         self._cached = cached
         self._photos: dict[int, _Photo] = {}
         self._directions = window_directions(config)
+        self._donors: dict[float, dict[int, tuple[int, ...]]] = {}
 
     def __len__(self) -> int:
         """Return how many panoramas there are."""
@@ -122,13 +136,28 @@ class DetectorSamples:
 
     def plain(self, index: int) -> DetectorSample:
         """Return a panorama as it is, made upright, and its targets."""
-        return self._moved(index, Motion(False, 0, self.config.width), 0)
+        image, seen = self._moved(index, Motion(False, 0, self.config.width))
+        objects = self._photo(index).objects
+        targets = window_targets(seen, objects, self.config, self.rules, 0)
+        return DetectorSample(extended(image, self.config), targets)
 
     def augmented(
         self, index: int, generator: torch.Generator, settings: DetectorAugmentation
     ) -> DetectorSample:
         """Return a panorama changed at random, and its targets: a pure function."""
-        motion = random_motion(
+        view = self._moved(index, self._motion(generator, settings))
+        seed = int(torch.randint(2**31, (), generator=generator))
+        objects = self._photo(index).objects
+        if settings.pasting is not None:
+            view, objects = self._pasted(view, objects, generator, settings)
+        image, seen = view
+        if settings.photometric is not None:
+            image = augment_photo(image, generator, settings.photometric)
+        targets = window_targets(seen, objects, self.config, self.rules, seed)
+        return DetectorSample(extended(image, self.config), targets)
+
+    def _motion(self, generator: torch.Generator, settings: DetectorAugmentation) -> Motion:
+        return random_motion(
             self.config.width,
             generator,
             mirror=settings.mirror,
@@ -136,15 +165,9 @@ class DetectorSamples:
             tilt=math.radians(settings.tilt_deg),
             tilted=settings.tilted,
         )
-        seed = int(torch.randint(2**31, (), generator=generator))
-        sample = self._moved(index, motion, seed)
-        if settings.photometric is None:
-            return sample
-        plain = sample.image[..., : self.config.width]
-        image = augment_photo(plain, generator, settings.photometric)
-        return DetectorSample(extended(image, self.config), sample.targets)
 
-    def _moved(self, index: int, motion: Motion, seed: int) -> DetectorSample:
+    def _moved(self, index: int, motion: Motion) -> View:
+        """Return the network's picture of a panorama and the instance id of each pixel."""
         photo = self._photo(index)
         height, width = photo.instances.shape
         # the transpose of a rotation is its inverse, and a row vector times it applies it
@@ -153,9 +176,40 @@ class DetectorSamples:
         image = sample_panorama(photo.image.float().div_(255.0), uv)
         column = uv[..., 0].floor().long() % width
         row = uv[..., 1].floor().long().clamp_(0, height - 1)
-        seen = photo.instances[row, column]
-        targets = window_targets(seen, photo.objects, self.config, self.rules, seed)
-        return DetectorSample(extended(image.clamp_(0.0, 1.0), self.config), targets)
+        return View(image.clamp_(0.0, 1.0), photo.instances[row, column])
+
+    def _pasted(
+        self,
+        view: View,
+        objects: LabelledObjects,
+        generator: torch.Generator,
+        settings: DetectorAugmentation,
+    ) -> tuple[View, LabelledObjects]:
+        """Return a view with objects of another panorama, and all objects."""
+        pasting = settings.pasting or Pasting(share=0.0)
+        if float(torch.rand((), generator=generator)) >= pasting.share:
+            return view, objects
+        worst = pasting.most_occlusion
+        if worst not in self._donors:
+            self._donors[worst] = donors_by_category(self.items, worst)
+        drawn = draw_donor(self._donors[worst], generator)
+        if drawn is None:
+            return view, objects
+        wanted, index = drawn
+        donor = self._moved(index, self._motion(generator, settings))
+        given = self._photo(index).objects
+        whole = given.counts & (given.occlusion <= worst)
+        chosen = draw_pasted(given.category, whole, wanted, pasting.others, generator)
+        shift = int(view.instances.max())
+        after = paste(view, donor, given.instance[chosen], shift)
+        kept = objects.counts & still_visible(view.instances, after.instances, objects.instance)
+        merged = LabelledObjects(
+            torch.cat((objects.instance, given.instance[chosen] + shift)),
+            torch.cat((objects.category, given.category[chosen])),
+            torch.cat((kept, given.counts[chosen])),
+            torch.cat((objects.occlusion, given.occlusion[chosen])),
+        )
+        return after, merged
 
     def _photo(self, index: int) -> _Photo:
         if index in self._photos:
@@ -184,6 +238,7 @@ def labelled_objects(item: PanoramaItem, rules: LabelRules) -> LabelledObjects:
         torch.tensor([x.instance for x in labels], dtype=torch.int32),
         torch.tensor([CATEGORIES.index(x.category) for x in labels], dtype=torch.long),
         torch.tensor([x.in_scene and x.occlusion <= worst for x in labels], dtype=torch.bool),
+        torch.tensor([x.occlusion for x in labels], dtype=torch.float32),
     )
 
 
