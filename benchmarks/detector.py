@@ -3,6 +3,8 @@
     python benchmarks/detector.py /work/pilot --weights runs/detector/weights.safetensors
     python benchmarks/detector.py /work/pilot --seams --photos photos --pictures pictures
     python benchmarks/detector.py /work/pilot --seams --card model_cards/detector-compact.md
+    python benchmarks/detector.py /work/pilot --split test-seen test-unseen --seams circular \
+        --output benchmarks/detector-test.json
 
 Writes benchmarks/detector.json: COCO's AP of masks and boxes, also of each category, recall of
 BFoVs, recall of the objects across the seam, seconds. The weights are the same for all ways; they
@@ -12,6 +14,7 @@ were trained with the first one. Pictures of photos and of panoramas of the set 
 import argparse
 import io
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
@@ -29,7 +32,7 @@ from panoscene.models.detector import (
     load_detector_stage,
 )
 from panoscene.scene import Detections, read_panorama, upright_photo, write_atomically
-from panoscene.synth.dataset import open_dataset
+from panoscene.synth.dataset import PanoramaItem, open_dataset
 from panoscene.train._detector_card import detector_card
 from panoscene.train._detector_eval import evaluate_detector
 from panoscene.train._detector_pictures import detector_picture
@@ -44,8 +47,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measures the detector.")
     parser.add_argument("data", type=Path, help="folder of a rendered set")
     parser.add_argument("--weights", type=Path, default=None)
-    parser.add_argument("--split", default="val")
-    parser.add_argument("--count", type=int, default=26, help="panoramas, at most")
+    parser.add_argument("--split", nargs="+", default=["val"], help="parts of the set")
+    parser.add_argument("--count", type=int, default=None, help="panoramas, at most")
     parser.add_argument("--seams", nargs="*", choices=get_args(Seam), default=list(get_args(Seam)))
     parser.add_argument("--roll", type=float, default=0.0, help="part of a turn")
     parser.add_argument("--photos", type=Path, default=None, help="folder of panoramas")
@@ -54,7 +57,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=OUTPUT)
     options = parser.parse_args()
     torch.set_num_threads(1)
-    items = open_dataset(options.data, options.split)[: options.count]
+    items = [x for split in options.split for x in open_dataset(options.data, split)]
+    items = items[: options.count]
     weights = options.weights or shipped_weights("detector")
     if options.card:
         header = read_weights_header(weights)
@@ -62,15 +66,15 @@ def main() -> None:
         text = detector_card(header.metrics, header.recipe, panoramas=count)
         write_atomically(options.card, text)
     if options.pictures:
-        draw(weights, options.data, options.split, options.photos, options.pictures)
-    if not options.seams or not options.count:
+        draw(weights, items, options.photos, options.pictures)
+    if not options.seams or not items:
         return
     result = {
         "scores": {
             seam: evaluate_detector(stage_of(weights, seam), items, roll=options.roll)
             for seam in options.seams
         },
-        "split": options.split,
+        "split": " and ".join(options.split),
         "panoramas": len(items),
         "roll": options.roll,
         "set": open_dataset(options.data).info.name,
@@ -92,11 +96,10 @@ def stage_of(weights: Path, seam: Seam) -> DetectorStage:
     return DetectorStage(network, score_threshold=DOUBTFUL)
 
 
-def draw(weights: Path, data: Path, split: str, photos: Path | None, output: Path) -> None:
+def draw(weights: Path, items: Sequence[PanoramaItem], photos: Path | None, output: Path) -> None:
     """Write pictures of six panoramas of the set, above the truth, and of all photos."""
     output.mkdir(parents=True, exist_ok=True)
     stage = load_detector_stage(weights=weights)
-    items = open_dataset(data, split)
     for item in items[:: max(1, len(items) // 6)][:6]:
         image = upright_photo(item.image(), item.scene().panorama)
         seen = seen_objects(item)

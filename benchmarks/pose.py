@@ -1,18 +1,19 @@
 """Scores the pose network with true BFoVs: writes benchmarks/pose.json and its model card.
 
-    python benchmarks/pose.py DATA [--split val] [--weights FILE] [--records FOLDER]
+    python benchmarks/pose.py DATA [--weights FILE] [--records FOLDER]
+    python benchmarks/pose.py DATA --split test-seen test-unseen --output benchmarks/pose-test.json
 
 Without a file the weights that come with the package are scored. Each panorama goes through the
 stage as a photo does: turned upright, cropped, with and without the true layout. ``--records`` is
 the output of ``panoscene precompute``; with it, detections and layouts of the networks are scored
-too. Results of a split other than val go into benchmarks/pose-SPLIT.json and leave the card alone.
+too. With another part or another file to write, the model card stays as it is.
 """
 
 import argparse
 import json
 import statistics
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ from panoscene.train._pose_scores import (
 )
 
 ROOT = Path(__file__).resolve().parents[1]
+OUTPUT = Path(__file__).with_suffix(".json")
 CARD = ROOT / "model_cards" / "pose-compact.md"
 ROWS = {
     "true_room": "true layout",
@@ -42,11 +44,12 @@ ROWS = {
 }
 
 
-def measure(data: Path, split: str, weights: Path, records: Path | None) -> dict:
+def measure(data: Path, splits: Sequence[str], weights: Path, records: Path | None) -> dict:
     """Return scores of all ways to run the stage, and how long it takes."""
     stage = load_pose_stage(weights=weights)
     found = {} if records is None else read_stage_records(records)
-    scenes = read_pose_scenes(open_dataset(data, split)[:], found)
+    items = [item for split in splits for item in open_dataset(data, split)]
+    scenes = read_pose_scenes(items, found)
     truth = [source.scene for source in scenes]
     objects: dict[str, list] = {name: [] for name in ROWS}
     seconds, processor = [], []
@@ -81,7 +84,7 @@ def measure(data: Path, split: str, weights: Path, records: Path | None) -> dict
     area = category_scores(objects["true_room"], truth)[0]
     count = np.bincount(torch.cat([s.objects.category for s in truth]).numpy(), minlength=57)
     return {
-        "split": split,
+        "split": " and ".join(splits),
         "panoramas": len(truth),
         "objects": int(count.sum()),
         "rows": rows,
@@ -150,14 +153,10 @@ def card(result: Mapping, weights: Path) -> str:
 LIMITS = (
     "## Limits",
     "",
-    "- These weights do not look at the crops: early in training the encoder's output went to",
-    "  nothing, and it was set to zero afterwards. All they know comes from BFoVs, categories, the",
-    "  other objects and the layout, so symmetric front and back are a guess. The network is",
-    "  mended; a new training will use the crops.",
     "- Thin things (pictures, carpets, clocks, mirrors) rarely reach an IoU of 0.15.",
     "- The checkpoint was chosen on the part it is scored on: expect somewhat less elsewhere.",
-    "- The training was stopped, changed and resumed by hand: recipe and seed alone do not give",
-    "  these weights.",
+    "- The training went on from weights of an earlier one, which are not published: recipe and",
+    "  seed alone do not give these weights.",
     "- Trained on a few hundred rendered panoramas, for an hour on part of one core. Real photos",
     "  were not seen.",
     "- Lengths scale with the height of the camera: a wrong one scales the room and all in it.",
@@ -175,7 +174,8 @@ def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--split", default="val")
+    parser.add_argument("--split", nargs="+", default=["val"], help="parts of the set")
+    parser.add_argument("--output", type=Path, default=OUTPUT)
     parser.add_argument("--weights", type=Path)
     parser.add_argument("--records", type=Path)
     given = parser.parse_args()
@@ -185,9 +185,8 @@ def main() -> None:
         raise SystemExit(str(error)) from None
     torch.set_num_threads(2)
     result = measure(given.data, given.split, weights, given.records)
-    name = "pose.json" if given.split == "val" else f"pose-{given.split}.json"
-    write_atomically(ROOT / "benchmarks" / name, json.dumps(result, indent=1) + "\n")
-    if given.split == "val":
+    write_atomically(given.output, json.dumps(result, indent=1) + "\n")
+    if (given.split, given.output) == (["val"], OUTPUT):
         CARD.parent.mkdir(exist_ok=True)
         write_atomically(CARD, card(result, weights))
     print(json.dumps(result["rows"], indent=1))

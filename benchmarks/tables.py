@@ -5,6 +5,8 @@
     panoscene experiment safety --json > benchmarks/safety.json
     panoscene bench score --json > benchmarks/score.json
     panoscene bench synth --json > benchmarks/synth.json
+    panoscene bench stages --json > benchmarks/stages.json
+    panoscene bench pipeline --json > benchmarks/pipeline.json
     python benchmarks/upright.py FOLDER-OF-A-RENDERED-SET
     python benchmarks/tables.py
 
@@ -17,6 +19,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from panoscene.cli._measure_pipeline import seconds_table
 from panoscene.eval import (
     benchmark_table,
     experiment_table,
@@ -32,6 +35,7 @@ PAGES = (
     "README.md",
     "docs/arrange.md",
     "docs/eval.md",
+    "docs/reconstruct.md",
     "docs/scene.md",
     "docs/synth.md",
     "docs/upright.md",
@@ -61,6 +65,8 @@ def tables() -> dict[str, str]:
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
         **upright_text(),
         **synth_text(),
+        **seconds_text("stages"),
+        **seconds_text("pipeline"),
     }
 
 
@@ -81,6 +87,20 @@ def synth_text() -> dict[str, str]:
         f"{(whole - 400) * hours:.1f}."
     )
     return {"synth": f"{synth_benchmark_table(measured)}\n\n{text}"}
+
+
+def seconds_text(name: str) -> dict[str, str]:
+    """Return how long stages or the pipeline take; nothing before it was measured."""
+    file = ROOT / "benchmarks" / f"{name}.json"
+    if not file.is_file():
+        return {}
+    measured = json.loads(file.read_text())
+    machine = measured["machine"]
+    text = (
+        f"Medians for a panorama of 1024 x 512 with {measured['objects']} objects, on "
+        f"{machine['processor']}, {machine['cores']} cores."
+    )
+    return {name: f"{seconds_table(measured)}\n\n{text}"}
 
 
 def upright_text() -> dict[str, str]:

@@ -49,7 +49,7 @@ PATIENCE = 90_000
 """Milliseconds; busy machines draw 3D slowly without a graphics card."""
 
 
-OPTIONAL = ("mitsuba", "mitsuba_oidn", "drjit", "mujoco", "fast_simplification", "ray")
+OPTIONAL = ("mitsuba", "mitsuba_oidn", "drjit", "mujoco", "ray")
 """Packages without which tests of data sets are skipped."""
 
 

@@ -36,5 +36,5 @@ def test_a_group_lists_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_.value.code in {0, None}
     printed = capsys.readouterr().out
     names = [name.split()[1] for name in cli.COMMANDS if name.startswith("eval ")]
-    assert len(names) == 3
+    assert len(names) == 4
     assert [name for name in names if name not in printed] == []

@@ -15,6 +15,8 @@ FIRST = tuple(name for name, method in METHODS.items() if method.fov_deg in (360
 
 
 def test_the_pages_of_results_are_up_to_date(root: Path) -> None:
+    page = str(root / "docs" / "simulated.md")
+    assert main(["eval", "report", str(root / "results" / "simulated"), "-o", page, "--check"]) == 0
     page, readme = str(root / "RESULTS.md"), str(root / "README.md")
     arguments = ["eval", "report", str(root / "results"), "-o", page, "--readme", readme]
     assert main([*arguments, "--check"]) == 0
@@ -23,15 +25,15 @@ def test_the_pages_of_results_are_up_to_date(root: Path) -> None:
 def test_the_code_still_gives_the_committed_scores(root: Path, tmp_path: Path) -> None:
     """Three rooms stand for all: rooms and errors depend on seed and number only.
 
-    After a change that is meant to change scores, make ``results/`` again, and ``results/first``
+    After a change that is meant to change scores, make ``results/simulated`` again, and ``first``
     with ``panoscene eval export -o runs/first --scenes 3 --methods`` with those of
-    ``FIRST`` and ``panoscene eval score runs/first -o results/first --replicates 0``.
+    ``FIRST`` and ``panoscene eval score runs/first -o results/simulated/first --replicates 0``.
     """
     export = ["eval", "export", "-o", str(tmp_path / "run"), "--scenes", "3"]
     assert main([*export, "--methods", ",".join(FIRST)]) == 0
     score = ["eval", "score", str(tmp_path / "run"), "-o", str(tmp_path / "scores")]
     assert main([*score, "--replicates", "0", "--workers", "1"]) == 0
-    committed = root / "results" / "first"
+    committed = root / "results" / "simulated" / "first"
     assert {path.stem for path in committed.glob("*.json")} == set(FIRST)
     for name in FIRST:
         found = flat(read_scores(tmp_path / "scores" / f"{name}.json"))
@@ -46,7 +48,7 @@ def test_the_code_still_gives_the_committed_scores(root: Path, tmp_path: Path) -
 
 
 def test_the_committed_scores_are_of_the_same_rooms(root: Path) -> None:
-    files = [read_scores(path) for path in (root / "results").glob("*.json")]
+    files = [read_scores(path) for path in (root / "results" / "simulated").glob("*.json")]
     assert len({score.targets_hash for score in files}) == 1
     assert {score.scenes for score in files} == {200}
     assert {score.replicates for score in files} == {1000}
@@ -56,8 +58,13 @@ def test_the_committed_scores_are_of_the_same_rooms(root: Path) -> None:
 
 def test_the_committed_scores_were_made_together(root: Path) -> None:
     """Those of 200 rooms and of the first three: same code, rows, rooms and metrics."""
-    whole = {score.method: score for score in map(read_scores, (root / "results").glob("*.json"))}
-    first = [read_scores(path) for path in (root / "results" / "first").glob("*.json")]
+    whole = {
+        score.method: score
+        for score in map(read_scores, (root / "results" / "simulated").glob("*.json"))
+    }
+    first = [
+        read_scores(path) for path in (root / "results" / "simulated" / "first").glob("*.json")
+    ]
     assert whole.keys() == METHODS.keys()
     assert {score.method for score in first} == set(FIRST)
     assert {score.replicates for score in first} == {0}
@@ -77,9 +84,9 @@ def test_a_results_file_is_noticed_when_a_page_is_stale(root: Path, tmp_path: Pa
     arguments = ["eval", "report", str(tmp_path / "results"), "-o", str(page)]
     arguments += ["--readme", str(readme), "--check"]
     assert main(arguments) == 0
-    changed = json.loads((tmp_path / "results" / "default.json").read_text())
+    changed = json.loads((tmp_path / "results" / "full.json").read_text())
     changed["metrics"]["detection.ap_15_mean_57"]["value"] += 0.01
-    (tmp_path / "results" / "default.json").write_text(json.dumps(changed))
+    (tmp_path / "results" / "full.json").write_text(json.dumps(changed))
     assert main(arguments) == 2
 
 

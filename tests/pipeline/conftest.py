@@ -9,8 +9,17 @@ from torch import Tensor
 
 from panoscene.models.layout import LayoutPrediction
 from panoscene.pipeline import Stages
-from panoscene.sample import sample_room_path
-from panoscene.scene import Detections, Layout, Objects, Scene, Shapes, box_mesh, read_scene
+from panoscene.sample import sample_photo_path, sample_room_path
+from panoscene.scene import (
+    Detections,
+    Layout,
+    Objects,
+    Scene,
+    Shapes,
+    box_mesh,
+    read_panorama,
+    read_scene,
+)
 
 Image = Float[Tensor, "3 height width"]
 
@@ -22,7 +31,9 @@ def truth() -> Scene:
 
 @pytest.fixture(scope="module")
 def image() -> Tensor:
-    return torch.rand(3, 64, 128, generator=torch.Generator().manual_seed(0))
+    """The sample photo, a quarter as large as networks see it."""
+    photo, _ = read_panorama(sample_photo_path())
+    return torch.nn.functional.interpolate(photo[None], size=(128, 256), mode="area")[0]
 
 
 class Knowing:

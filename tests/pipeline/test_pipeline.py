@@ -87,5 +87,16 @@ def test_a_tilted_photo_is_turned(
 
 def test_a_photo_without_a_record_is_taken_at_the_usual_height(truth: Scene, image: Tensor) -> None:
     result = Pipeline(Knowing(truth).stages(shape=None))(image, name="room")
-    assert result.scene.panorama == Panorama(128, 64, 1.6)
+    assert result.scene.panorama == Panorama(256, 128, 1.6)
     assert result.scene.name == "room"
+
+
+def test_the_same_photo_gives_the_same_scene(truth: Scene, image: Tensor) -> None:
+    pipeline = Pipeline(Knowing(truth).stages())
+    first, second = pipeline(image, truth.panorama), pipeline(image, truth.panorama)
+    for one, two in ((first.scene, second.scene), (first.initial, second.initial)):
+        assert torch.equal(one.objects.boxes.centre, two.objects.boxes.centre)
+        assert torch.equal(one.objects.boxes.size, two.objects.boxes.size)
+        assert torch.equal(one.objects.boxes.yaw, two.objects.boxes.yaw)
+    assert torch.equal(first.image, second.image)
+    assert first.flags == second.flags

@@ -119,7 +119,7 @@ def test_resume_leaves_out_what_is_there(
     ("arguments", "message"),
     [
         (["--camera-height", "0"], "--camera-height: found 0"),
-        (["--resolution", "1000"], "--resolution: found 1000, expected 8 to 256"),
+        (["--resolution", "100"], "--resolution: found 100, expected 32, 64, 128 or 256"),
         (["--device", "abacus"], "--device: found abacus"),
         (["--weights", "nowhere"], "--weights nowhere: found no folder there"),
         (["--steps", "-1"], "--steps: found -1"),

@@ -223,11 +223,16 @@ def bench(subject: Subject, *, repeats: Count = 5, cache: Cache = None, json: Fl
 
     For synth: seconds and memory of rendering panoramas of the full set with two processes, each
     of which makes one home first and then as many as there are repeats. Takes about ten minutes
-    and the models of panoscene synth assets. For example:
+    and the models of panoscene synth assets.
+
+    For stages: the detector, the layout, poses and shapes of 20 objects in one panorama. For
+    pipeline: the whole way from a panorama to a scene with 20 objects, each of its stages, and the
+    command panoscene reconstruct from its start to its end. Takes some minutes. For example:
 
         panoscene bench arrange
         panoscene bench arrange --repeats 3 --json | jq .scene_20_ms
         panoscene bench synth --json | jq .panorama_s
+        panoscene bench pipeline --json | jq .total_s
 
     Args:
         subject: What to measure.
@@ -239,6 +244,10 @@ def bench(subject: Subject, *, repeats: Count = 5, cache: Cache = None, json: Fl
         from panoscene.cli._measure_synth import run_synth_bench
 
         return run_synth_bench(cache, repeats, as_json=json)
+    if subject in ("stages", "pipeline"):
+        from panoscene.cli._measure_pipeline import run_pipeline_bench
+
+        return run_pipeline_bench(subject, repeats, as_json=json)
     from panoscene.cli._measure import run_bench
 
     return run_bench(subject, repeats, as_json=json)

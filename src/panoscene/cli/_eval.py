@@ -1,7 +1,9 @@
 """Predictions to disk, scores from disk, tables from scores."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
@@ -12,11 +14,15 @@ from panoscene.eval import (
     MANIFEST,
     METHODS,
     PREDICTIONS,
+    RENDERED,
+    ROWS,
     SUMMARY,
     TARGETS,
     ExportedMethod,
     ScoreFile,
     export_predictions,
+    export_reconstructions,
+    in_order,
     read_manifest,
     read_scores,
     results_page,
@@ -28,7 +34,10 @@ from panoscene.eval import (
     write_scores,
 )
 from panoscene.eval import replace_between as between
+from panoscene.models import Edition, shipped_weights
+from panoscene.pipeline import load
 from panoscene.scene import Scene, read_scene
+from panoscene.synth.dataset import open_dataset
 
 Job = tuple[Path, ExportedMethod, Path]
 """A folder of predictions, what is known of it, and the folder of its targets."""
@@ -56,6 +65,35 @@ def run_export(
             progress=progress,
         )
     note(f"wrote {output}: {len(rooms)} targets and the predictions of {', '.join(done)}")
+    return 0
+
+
+def run_reconstruct(
+    data: Path, output: Path, splits: Sequence[str], weights: Path | None, edition: Edition
+) -> int:
+    """Write what the pipeline and its parts predict for a rendered set; return the exit code."""
+    if weights is not None and not weights.is_dir():
+        raise InputError(f"--weights {weights}: found no folder there")
+    check_folder(output)
+    items = [item for split in splits for item in open_dataset(data, split)]
+    if not items:
+        raise InputError(f"{data}: found no panoramas of {' and '.join(splits)}")
+    pipeline = load(edition, weights=weights, shapes=False)
+    names = ("detector", "layout", "pose", "context")
+    files = {
+        name: shipped_weights(name) if weights is None else weights / f"{name}.safetensors"
+        for name in names
+    }
+    with progress_words() as progress, blaming("--output"):
+        export_reconstructions(
+            output,
+            items,
+            pipeline,
+            data=f"{RENDERED}, {' and '.join(splits)}",
+            sources={name: sha256(file.read_bytes()).hexdigest() for name, file in files.items()},
+            told=lambda done, total: progress(f"reconstructing: {done} of {total}"),
+        )
+    note(f"wrote {output}: {len(items)} targets and the predictions of {', '.join(ROWS)}")
     return 0
 
 
@@ -117,8 +155,7 @@ def run_report(source: Path, output: Path, readme: Path | None, *, check: bool) 
     files = sorted(source.glob("*.json")) if source.is_dir() else [source]
     if not files:
         raise InputError(f"{source}: found no files of scores, expected those of eval score")
-    order = {name: place for place, name in enumerate(METHODS)}
-    scores = sorted(map(read_scores, files), key=lambda s: order.get(s.method, len(order)))
+    scores = in_order([read_scores(file) for file in files])
     with blaming(source):
         texts = {output: results_page(scores)}
         if readme is not None:

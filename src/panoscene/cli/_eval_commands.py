@@ -3,7 +3,7 @@
 """The commands of evaluation: functions whose parameters are the options, docstrings the help."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
@@ -51,6 +51,39 @@ def export(
     from panoscene.cli._eval import run_export
 
     return run_export(output, targets, methods, scenes=scenes, seed=seed)
+
+
+def reconstruct(
+    data: Annotated[Positional[Path], arg(metavar="DIR")],
+    *,
+    output: Output,
+    split: Annotated[
+        tuple[Literal["train", "val", "test-seen", "test-unseen"], ...], arg(metavar="SPLIT")
+    ] = ("test-seen", "test-unseen"),
+    weights: OptionalFolder = None,
+    edition: Literal["compact", "paper"] = "compact",
+) -> int:
+    """Write the true scenes of a rendered set and what the pipeline predicts from its photos.
+
+    Rows: the whole pipeline, the same without its later parts, a trivial baseline, and oracles
+    that know the true room, BFoVs, boxes or relations. May be stopped at any time: the same command
+    goes on. For example:
+
+        panoscene eval reconstruct data -o runs/test
+        panoscene eval score runs/test -o results
+
+    The folder gets targets/, predictions/ROW/ and export.json.
+
+    Args:
+        data: Folder of the rendered set.
+        output: Folder for everything.
+        split: Parts of the set.
+        weights: Folder with the networks' weights, instead of those that come with the package.
+        edition: Of the networks.
+    """
+    from panoscene.cli._eval import run_reconstruct
+
+    return run_reconstruct(data, output, split, weights, edition)
 
 
 def score(

@@ -41,6 +41,7 @@ OptionalNumber = Annotated[float | None, arg(metavar="X", help_behavior_hint="")
 Flag = Annotated[bool, arg(help_behavior_hint="")]
 Trial = Annotated[Positional[Literal["arrange", "safety"]], arg(metavar="{arrange,safety}")]
 Subject = Annotated[
-    Positional[Literal["arrange", "score", "synth"]], arg(metavar="{arrange,score,synth}")
+    Positional[Literal["arrange", "score", "synth", "stages", "pipeline"]],
+    arg(metavar="{arrange,score,synth,stages,pipeline}"),
 ]
 Cache = Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")]

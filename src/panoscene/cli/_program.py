@@ -21,6 +21,7 @@ from panoscene.cli._commands import (
 )
 from panoscene.cli._errors import InputError
 from panoscene.cli._eval_commands import export, report, score
+from panoscene.cli._eval_commands import reconstruct as eval_reconstruct
 from panoscene.cli._help import explain, summarised
 from panoscene.cli._reconstruct_command import reconstruct
 from panoscene.cli._terminal import complain
@@ -41,6 +42,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "train": train,
     "precompute": precompute,
     "eval export": export,
+    "eval reconstruct": eval_reconstruct,
     "eval score": score,
     "eval report": report,
     "synth assets": synth.assets,
@@ -60,8 +62,8 @@ Predictions are written once, as scene.json, and scored from disk, so that anybo
 program that writes scene.json. For example:
 
     panoscene eval export -o runs/rooms --scenes 200
-    panoscene eval score runs/rooms -o results
-    panoscene eval report results -o RESULTS.md
+    panoscene eval score runs/rooms -o scores
+    panoscene eval report scores -o scores.md
 """,
     "synth": """\
 Make data sets: furnished homes, path-traced panoramas, exact labels.

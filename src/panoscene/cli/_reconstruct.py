@@ -1,16 +1,18 @@
 """Photos in, scenes out: files for people and programs, in one folder for each photo."""
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from uuid import uuid4
 
 from panoscene.cli._draw import draw_pictures
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import check_folder, write_bytes
 from panoscene.cli._progress import progress_bar
+from panoscene.cli._ray import ray_cluster, spread
 from panoscene.cli._terminal import complain, json_text, note, say, say_json
 from panoscene.exports import write_floor_plan_svg, write_glb
 from panoscene.pipeline import Pipeline, Reconstruction
@@ -27,6 +29,8 @@ from panoscene.views import describe_violations, write_report
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp"})
 SCENE = "scene.json"
 """The file that is written last: where it is, everything is."""
+TEXTURE = 64.0
+"""Pixels for each metre of the painted room: those of the panorama at 2.5 m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,32 +89,127 @@ def photo_folders(files: Sequence[Path], output: Path) -> dict[Path, Path]:
     return {file: output / file.stem for file in files}
 
 
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One photo, and where its results go."""
+
+    file: Path
+    folder: Path
+    choice: Choice
+
+    def done(self) -> bool:
+        """Return whether the results are there."""
+        return (self.folder / SCENE).is_file()
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a photo."""
+
+    entry: dict[str, Any]
+    """For programs."""
+    text: tuple[str, ...] = ()
+    """For people, line by line."""
+
+
 def reconstruct_files(
-    pipeline: Pipeline, files: Sequence[Path], output: Path, choice: Choice, *, as_json: bool
+    make: Callable[[], Pipeline],
+    files: Sequence[Path],
+    output: Path,
+    choice: Choice,
+    *,
+    as_json: bool,
+    ray: str | None = None,
 ) -> int:
-    """Reconstruct photos, say what was found, and return the exit code."""
+    """Reconstruct photos, say what was found, and return the exit code.
+
+    Args:
+        make: makes the pipeline, once in each process that needs it.
+        files: the photos.
+        output: folder for the results, or for a folder of each photo.
+        choice: what to make of each photo.
+        as_json: print the outcomes as JSON.
+        ray: address of a Ray cluster to spread the photos over, "" for the one that is running
+            here; None works on them in this process.
+    """
     folders = photo_folders(files, output)
-    told: list[dict[str, Any]] = []
-    with progress_bar("reconstructing", len(files)) as advance:
-        for file in files:
-            folder = folders[file]
-            if choice.resume and (folder / SCENE).is_file():
-                told.append({"photo": str(file), "ok": True, "output": str(folder), "new": False})
-            else:
-                told.append(_one(pipeline, file, folder, choice, quiet=as_json))
+    tasks = [Task(file, folders[file], choice) for file in files]
+    left = [task for task in tasks if not (choice.resume and task.done())]
+    told: dict[Path, dict[str, Any]] = {}
+    with progress_bar("reconstructing", len(left)) as advance:
+        for task, outcome in _outcomes(make, left, ray):
+            told[task.file] = outcome.entry
+            if "error" in outcome.entry:
+                complain(outcome.entry["error"])
+            for flag in outcome.entry.get("flags", ()):
+                note(f"{task.file}: {flag['text']}")
+            for line in () if as_json else outcome.text:
+                say(line)
             advance(1)
+    entries = [told.get(task.file) or _there(task) for task in tasks]
     if as_json:
-        say_json(told)
+        say_json(entries)
     elif len(files) > 1:
-        made = sum(entry["ok"] for entry in told)
+        made = sum(entry["ok"] for entry in entries)
         say(f"wrote {output}: {made} of {len(files)} photos")
-    return 0 if all(entry["ok"] for entry in told) else 2
+    return 0 if all(entry["ok"] for entry in entries) else 2
 
 
-def _one(
-    pipeline: Pipeline, file: Path, folder: Path, choice: Choice, *, quiet: bool
-) -> dict[str, Any]:
-    """Reconstruct one photo; what is wrong with it is told and does not stop the others."""
+def _there(task: Task) -> dict[str, Any]:
+    return {"photo": str(task.file), "ok": True, "output": str(task.folder), "new": False}
+
+
+def _outcomes(
+    make: Callable[[], Pipeline], tasks: Sequence[Task], ray: str | None
+) -> Iterator[tuple[Task, Outcome]]:
+    """Return tasks with what came of them, as they finish."""
+    if not tasks:
+        return
+    if ray is None:
+        pipeline = make()
+        for task in tasks:
+            yield task, reconstruct_one(pipeline, task)
+        return
+    # other computers start in other folders
+    shared = {
+        replace(task, file=task.file.resolve(), folder=task.folder.resolve()): task
+        for task in tasks
+    }
+    with ray_cluster(ray or None) as connected:
+        given = uuid4().hex, make
+        for task, outcome in spread(connected, reconstruct_there, given, list(shared)):
+            yield shared[task], _checked(shared[task], outcome)
+
+
+def reconstruct_there(run: str, make: Callable[[], Pipeline], task: Task) -> Outcome:
+    """Return what came of a photo on another computer; a process makes one pipeline a run."""
+    if not task.file.is_file():
+        problem = f"{task.file}: not on every computer of the cluster, expected a shared folder"
+        return Outcome({"photo": str(task.file), "ok": False, "error": problem})
+    if run not in _MADE:
+        _MADE.clear()
+        _MADE[run] = make()
+    return reconstruct_one(_MADE[run], task)
+
+
+_MADE: dict[str, Pipeline] = {}
+"""The pipeline of this process, by the run that it is for."""
+
+
+def _checked(task: Task, outcome: Outcome) -> Outcome:
+    """Return an outcome under the names of this computer, or what is wrong about its folder."""
+    entry = outcome.entry | {"photo": str(task.file)}
+    if not entry["ok"]:
+        return Outcome(entry)
+    if not task.done():
+        problem = f"{task.folder}: not here, expected a folder that all computers share"
+        return Outcome({"photo": str(task.file), "ok": False, "error": problem})
+    return Outcome(entry | {"output": str(task.folder)}, outcome.text)
+
+
+def reconstruct_one(pipeline: Pipeline, task: Task) -> Outcome:
+    """Return what came of a photo; what is wrong with it is told and does not stop the others."""
+    file, folder, choice = task.file, task.folder, task.choice
     try:
         image, panorama = read_panorama(file, camera_height=choice.camera_height)
         start = time.perf_counter()
@@ -118,23 +217,26 @@ def _one(
         seconds = time.perf_counter() - start
         _write(result, file, folder)
     except (PanoramaError, SceneFormatError, InputError) as error:
-        complain(str(error))
-        return {"photo": str(file), "ok": False, "error": str(error)}
+        return Outcome({"photo": str(file), "ok": False, "error": str(error)})
     except OSError as error:
         message = f"{folder}: cannot be written: {(error.strerror or str(error)).lower()}"
-        complain(message)
-        return {"photo": str(file), "ok": False, "error": message}
-    for doubt in result.doubts:
-        note(f"{file}: {doubt}")
-    if not quiet:
-        _tell(result, folder, seconds)
-    return {
+        return Outcome({"photo": str(file), "ok": False, "error": message})
+    entry = {
         "photo": str(file),
         "ok": True,
         "new": True,
         "output": str(folder),
         "objects": len(result.scene.objects.boxes),
         "corners": len(result.scene.layout.floor_polygon),
+        **_account(result),
+    }
+    return Outcome(entry, tuple(_lines(result, folder, seconds)))
+
+
+def _account(result: Reconstruction) -> dict[str, Any]:
+    """Return how a result came about, for programs."""
+    return {
+        "flags": [flag.as_dict() for flag in result.flags],
         "doubts": list(result.doubts),
         "timings": result.timings,
         "certificate": None if result.certificate is None else result.certificate.as_dict(),
@@ -150,7 +252,7 @@ def _write(result: Reconstruction, file: Path, folder: Path) -> None:
             scene, drafts, image=result.image, reference=None, page=False, sheet=False
         ):
             pass
-        write_glb(scene, drafts / "scene.glb", image=result.image)
+        write_glb(scene, drafts / "scene.glb", image=result.image, texture_px_per_metre=TEXTURE)
         write_floor_plan_svg(scene, drafts / "floorplan.svg")
         write_report(
             drafts / "report.html",
@@ -162,20 +264,15 @@ def _write(result: Reconstruction, file: Path, folder: Path) -> None:
             title=scene.name,
             notes=result.doubts,
         )
-        account = {
-            "schema": "panoscene/reconstruction",
-            "version": 1,
-            "timings": result.timings,
-            "doubts": list(result.doubts),
-            "certificate": None if result.certificate is None else result.certificate.as_dict(),
-        }
+        account = {"schema": "panoscene/reconstruction", "version": 1, **_account(result)}
         (drafts / "reconstruction.json").write_text(json_text(account) + "\n", encoding="utf-8")
         write_scene(relocate_photo(scene, file.resolve(), folder.resolve() / SCENE), drafts / SCENE)
         for draft in sorted(drafts.iterdir(), key=lambda path: (path.name == SCENE, path.name)):
             write_bytes(folder / draft.name, draft.read_bytes())
 
 
-def _tell(result: Reconstruction, folder: Path, seconds: float) -> None:
+def _lines(result: Reconstruction, folder: Path, seconds: float) -> Iterator[str]:
+    """Return what was found, in sentences."""
     scene = result.scene
     names = [_name(scene, k) for k in range(len(scene.objects.boxes))]
     counted = ", ".join(
@@ -184,12 +281,12 @@ def _tell(result: Reconstruction, folder: Path, seconds: float) -> None:
     )
     corners = len(scene.layout.floor_polygon)
     height = scene.layout.ceiling_height - scene.layout.floor_height
-    say(f"{scene.name}: a room with {corners} corners, {height:.2f} m high, in {seconds:.1f} s")
-    say(f"  {len(names)} objects: {counted}" if names else "  no objects")
+    yield f"{scene.name}: a room with {corners} corners, {height:.2f} m high, in {seconds:.1f} s"
+    yield f"  {len(names)} objects: {counted}" if names else "  no objects"
     if result.certificate is not None:
-        say(f"  before the arrangement: {describe_violations(result.certificate.before)}")
-        say(f"  after it: {describe_violations(result.certificate.after)}")
-    say(f"  open {folder / 'report.html'} in a browser; the scene is {folder / SCENE}")
+        yield f"  before the arrangement: {describe_violations(result.certificate.before)}"
+        yield f"  after it: {describe_violations(result.certificate.after)}"
+    yield f"  open {folder / 'report.html'} in a browser; the scene is {folder / SCENE}"
 
 
 def _name(scene: Any, index: int) -> str:

@@ -3,12 +3,14 @@
 """The command that turns photos into scenes."""
 
 import math
+from functools import partial
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from panoscene.cli._errors import InputError
 from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFile, Output
+from panoscene.cli._synth_commands import Address
 
 
 def reconstruct(
@@ -27,6 +29,7 @@ def reconstruct(
     no_shapes: Flag = False,
     keep_frame: Flag = False,
     resume: Flag = False,
+    ray: Address = None,
     json: Flag = False,
 ) -> int:
     """Turn 360-degree photos of rooms into 3D scenes.
@@ -38,6 +41,7 @@ def reconstruct(
 
         panoscene reconstruct photo.jpg -o room
         panoscene reconstruct photos/ -o rooms --resume
+        panoscene reconstruct /shared/photos -o /shared/rooms --ray
 
     A photo that cannot be used is reported and left out; the exit code is then 2.
 
@@ -49,37 +53,48 @@ def reconstruct(
         weights: Folder with the networks' weights, instead of those that come with the package.
         device: Where the networks run: cpu, cuda, cuda:1 ...
         steps: Steps of the arrangement's descent; 0 leaves the boxes as the networks say.
-        resolution: Of the grid in which meshes are found, from 8 to 256.
+        resolution: Cells along each axis of the grid in which meshes are found: 32, 64, 128 or
+            256. Meshes have up to 32 triangles for each.
         no_shapes: Leave out the meshes; objects are boxes.
         keep_frame: Take photos as they are, even if the camera was tilted.
         resume: Leave out photos whose results are there.
+        ray: Spread photos over a Ray cluster whose computers share their folder and OUT: the one
+            at this address, or the running one; without any, over this computer. Needs pip
+            install 'panoscene[ray]'.
         json: Print what was found as JSON.
     """
     if not photos:
         raise InputError("PHOTO: found nothing, expected panoramas, folders or patterns")
     if not 0 < camera_height < math.inf:
         raise InputError(f"--camera-height: found {camera_height}, expected metres above 0")
-    if not 8 <= resolution <= 256:
-        raise InputError(f"--resolution: found {resolution}, expected 8 to 256")
+    if resolution not in (32, 64, 128, 256):
+        raise InputError(f"--resolution: found {resolution}, expected 32, 64, 128 or 256")
     if weights is not None and not weights.is_dir():
         raise InputError(f"--weights {weights}: found no folder there")
     from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
-    from panoscene.cli._settings import chosen_settings
-    from panoscene.pipeline import load
+    from panoscene.pipeline import PHOTO, load
 
     files = photo_files(photos)
     photo_folders(files, output)
-    settings = None if steps == 0 else chosen_settings("default", None, steps)
-    pipeline = load(
+    if steps is not None and steps < 0:
+        raise InputError(f"--steps: found {steps}, expected 0 or more")
+    settings = PHOTO.model_copy(update={"steps": PHOTO.steps if steps is None else steps})
+    make = partial(
+        load,
         edition,
         weights=weights,
         device=checked_device(device),
         shapes=not no_shapes,
         level=not keep_frame,
-        settings=settings,
+        settings=None if steps == 0 else settings,
     )
     choice = Choice(camera_height, resolution, resume)
-    return reconstruct_files(pipeline, files, output, choice, as_json=json)
+    try:
+        return reconstruct_files(make, files, output, choice, as_json=json, ray=ray)
+    except ModuleNotFoundError as error:
+        if error.name != "ray":
+            raise
+        raise InputError(str(error)) from None
 
 
 def checked_device(name: str) -> str:

@@ -1,6 +1,5 @@
 """Trainings, and the first stages run over a data set."""
 
-import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -16,7 +15,9 @@ from panoscene.train import (
     TASKS,
     Stage,
     chosen_precision,
+    file_hash,
     precompute,
+    precompute_estimates,
     read_train_recipe,
     train,
 )
@@ -75,12 +76,12 @@ def run_precompute(
         from panoscene.models.detector import load_detector_stage  # noqa: PLC0415
 
         finder = load_detector_stage(edition, detector, device)
-        sources["detector"] = _hash(detector or shipped_weights("detector"))
+        sources["detector"] = file_hash(detector or shipped_weights("detector"))
     if only != "detector":
         from panoscene.models.layout import load_layout_stage  # noqa: PLC0415
 
         reader = load_layout_stage(edition, layout, device)
-        sources["layout"] = _hash(layout or shipped_weights("layout"))
+        sources["layout"] = file_hash(layout or shipped_weights("layout"))
     with steps_told("detecting") as step:
         new = precompute(
             data, output, detector=finder, layout=reader, sources=sources, splits=splits,
@@ -90,5 +91,34 @@ def run_precompute(
     return 0
 
 
-def _hash(weights: Path) -> str:
-    return hashlib.sha256(weights.read_bytes()).hexdigest()
+def run_precompute_estimates(
+    data: Path,
+    records: Path,
+    output: Path,
+    edition: Edition,
+    *,
+    pose: Path | None,
+    shape: Path | None,
+    splits: tuple[str, ...],
+    device: str,
+) -> int:
+    """Write what is missing of the estimates, and return the exit code."""
+    from panoscene.models.pose import load_pose_stage  # noqa: PLC0415
+    from panoscene.models.shape import load_shape_stage  # noqa: PLC0415
+
+    if not splits:
+        raise InputError("--split: found none, expected at least one part of the data set")
+    device = checked_device(device)
+    sources = {
+        "edition": edition,
+        "pose": file_hash(pose or shipped_weights("pose")),
+        "shape": file_hash(shape or shipped_weights("shape")),
+    }
+    with steps_told("looking at objects") as step:
+        new = precompute_estimates(
+            data, records, output, pose=load_pose_stage(edition, pose, device),
+            shape=load_shape_stage(edition, shape, device), sources=sources, splits=splits,
+            told=lambda done, total: step(done, total) if done else None,
+        )  # fmt: skip
+    note(f"wrote {output}: {new} new estimates")
+    return 0

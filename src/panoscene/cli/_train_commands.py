@@ -10,8 +10,8 @@ from tyro.conf import Positional, arg
 from panoscene.cli._options import Flag, OptionalCount, OptionalFile, Output
 
 StageName = Annotated[
-    Positional[Literal["detector", "layout", "pose", "shape"]],
-    arg(metavar="{detector,layout,pose,shape}"),
+    Positional[Literal["detector", "layout", "pose", "shape", "context"]],
+    arg(metavar="{detector,layout,pose,shape,context}"),
 ]
 DataFolder = Annotated[Path, arg(metavar="DIR")]
 OptionalFolder = Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")]
@@ -74,19 +74,25 @@ def precompute(
         Literal["detector", "layout"] | None,
         arg(metavar="{detector,layout}", help_behavior_hint=""),
     ] = None,
+    records: OptionalFolder = None,
+    pose: OptionalFile = None,
+    shape: OptionalFile = None,
     split: Annotated[
         tuple[Literal["train", "val", "test-seen", "test-unseen"], ...], arg(metavar="SPLIT")
     ] = ("train", "val"),
     device: Annotated[str, arg(metavar="NAME")] = "cpu",
 ) -> int:
-    """Run detector and layout network once over a data set, for the training of later stages.
+    """Run the first stages once over a data set, for the training of later stages.
 
     May be stopped at any time: the same command goes on where it was. For example:
 
         panoscene precompute data -o stage1
         panoscene precompute data -o stage1 --detector runs/detector/weights.safetensors
+        panoscene precompute data -o stage2 --records stage1 --pose runs/pose/weights.safetensors
 
-    OUT/records/NAME.json has what was found in each panorama; recipes of the stage pose name OUT.
+    Detector and layout network come first: OUT/records/NAME.json has what was found in each
+    panorama, for recipes of the stage pose. With --records pose and shape network follow:
+    OUT/estimates/NAME.safetensors has what they see, for recipes of the stage context.
 
     Args:
         data: Folder of the data set.
@@ -95,11 +101,23 @@ def precompute(
         detector: Weights of the detector; those of the package without it.
         layout: Weights of the layout network; those of the package without it.
         only: Leave out the other stage.
+        records: What this command wrote before; then pose and shape network are run.
+        pose: Weights of the pose network; those of the package without it.
+        shape: Weights of the shape network; those of the package without it.
         split: Parts of the data set.
         device: Where the networks run: cpu, cuda, cuda:1 ...
     """
-    from panoscene.cli._train import run_precompute
+    from panoscene.cli._errors import InputError
+    from panoscene.cli._train import run_precompute, run_precompute_estimates
 
+    if records is not None:
+        if detector or layout or only:
+            raise InputError("--records: found --detector, --layout or --only, too; expected none")
+        return run_precompute_estimates(
+            data, records, output, edition, pose=pose, shape=shape, splits=split, device=device
+        )
+    if pose or shape:
+        raise InputError("--pose and --shape: expected --records, for which they are")
     return run_precompute(
         data, output, edition, detector, layout, only=only, splits=split, device=device
     )

@@ -1,5 +1,24 @@
 """Data for networks: targets, augmentation, samples in a reproducible order."""
 
+from ._context_batch import ContextSample as ContextSample
+from ._context_batch import collate_context as collate_context
+from ._context_batch import estimates_of as estimates_of
+from ._context_batch import targets_of as targets_of
+from ._context_noise import OutputNoise as OutputNoise
+from ._context_noise import noise_of as noise_of
+from ._context_noise import noisy_output as noisy_output
+from ._context_noise import output_noise as output_noise
+from ._context_records import ESTIMATES as ESTIMATES
+from ._context_records import EncodedObjects as EncodedObjects
+from ._context_records import EstimateRecord as EstimateRecord
+from ._context_records import read_estimate_record as read_estimate_record
+from ._context_records import read_estimate_records as read_estimate_records
+from ._context_records import write_estimate_record as write_estimate_record
+from ._context_samples import ContextAugmentation as ContextAugmentation
+from ._context_samples import ContextScene as ContextScene
+from ._context_samples import context_sample as context_sample
+from ._context_samples import plain_context_sample as plain_context_sample
+from ._context_samples import read_context_scenes as read_context_scenes
 from ._detector_samples import DetectorAugmentation as DetectorAugmentation
 from ._detector_samples import DetectorSample as DetectorSample
 from ._detector_samples import DetectorSamples as DetectorSamples

@@ -15,9 +15,10 @@ from torch.nn import functional as F
 
 from panoscene.models.shape import ShapeTargets, view_hints
 from panoscene.scene import CATEGORIES, write_atomically
+from panoscene.synth.assets import SHAPE_MARGIN, load_library
 
 from ._shape_crops import CROP_MARGIN, ObjectCrops
-from ._shape_store import SHAPE_MARGIN, ModelShape, read_model_shape
+from ._shape_store import ModelShape, read_model_shape
 
 _CUBE = 0.7
 _WINDOW = (0.90, 1.12)
@@ -145,13 +146,18 @@ def read_seen_views(path: Path) -> SeenViews:
         return SeenViews(names, *(file.get_tensor(name) for name in _SEEN))
 
 
-def read_store(store: Path) -> dict[str, ModelShape]:
+def read_store(store: Path, cache: Path) -> dict[str, ModelShape]:
     """Return all models of a store by id.
 
+    Args:
+        store: Folder with their pictures.
+        cache: Folder of the models and their signed distances.
+
     Raises:
-        AssetError: A file is damaged.
+        AssetError: A file is damaged or missing.
     """
-    shapes = (read_model_shape(path) for path in sorted(store.glob("*.npz")))
+    library = load_library(cache)
+    shapes = (read_model_shape(path, library) for path in sorted(store.glob("*.npz")))
     return {shape.id: shape for shape in shapes}
 
 

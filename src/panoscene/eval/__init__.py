@@ -85,10 +85,14 @@ from panoscene.eval._relation_records import YawErrors as YawErrors
 from panoscene.eval._relation_records import score_relations as score_relations
 from panoscene.eval._relation_scores import fidelity_record as fidelity_record
 from panoscene.eval._relation_scores import relation_record as relation_record
+from panoscene.eval._rendered import export_reconstructions as export_reconstructions
+from panoscene.eval._rendered_rows import RENDERED as RENDERED
+from panoscene.eval._rendered_rows import ROWS as ROWS
 from panoscene.eval._report import replace_between as replace_between
 from panoscene.eval._report import results_page as results_page
 from panoscene.eval._report import summary_note as summary_note
 from panoscene.eval._report import summary_table as summary_table
+from panoscene.eval._report_facts import in_order as in_order
 from panoscene.eval._results import Measured as Measured
 from panoscene.eval._results import ScoreFile as ScoreFile
 from panoscene.eval._results import read_scores as read_scores

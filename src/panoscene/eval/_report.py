@@ -12,6 +12,7 @@ from panoscene.eval._paper_rows import (
 )
 from panoscene.eval._published import PAPER_ABLATION
 from panoscene.eval._report_facts import (
+    are_rendered,
     are_simulated,
     categories_without_targets,
     check_same_targets,
@@ -132,36 +133,54 @@ def replace_between(text: str, name: str, content: str) -> str:
 
 
 def _introduction(scores: Sequence[ScoreFile]) -> list[str]:
-    first, ours = scores[0], are_simulated(scores)
+    first, simulated, rendered = scores[0], are_simulated(scores), are_rendered(scores)
+    folder = "results/simulated" if simulated else "results"
+    ours = simulated or rendered
     parts = [
-        "# Results",
+        "# Results on simulated estimates" if simulated else "# Results",
         "Every number on this page is written by `panoscene eval report` from "
-        f"{'the files in `results/`' if ours else 'files of scores'}; nothing is typed by hand."
+        f"{f'the files in `{folder}/`' if ours else 'files of scores'}; nothing is typed by hand."
         f"{' Made with' if ours else ''}",
     ]
-    if ours:
+    if simulated:
         parts.append(
             "```text\npanoscene eval export -o runs/rooms\n"
-            "panoscene eval score runs/rooms -o results\n"
+            "panoscene eval score runs/rooms -o results/simulated\n"
+            "panoscene eval report results/simulated -o docs/simulated.md\n```"
+        )
+    elif rendered:
+        parts.append(
+            "```text\npanoscene synth render configs/synth/full.yaml data --limit 400\n"
+            "panoscene eval reconstruct data -o runs/test\n"
+            "panoscene eval score runs/test -o results\n"
             "panoscene eval report results -o RESULTS.md --readme README.md\n```"
         )
-    page = "[docs/eval.md](docs/eval.md)" if ours else "the page `eval` of panoscene's docs"
+    page = "the page `eval` of panoscene's docs"
+    if ours:
+        page = "[eval](eval.md)" if simulated else "[docs/eval.md](docs/eval.md)"
     parts.append(
         f"Targets: {first.data or 'scenes'} ({first.scenes} scenes, {first.objects} objects, hash "
         f"`{first.targets_hash}`). {_intervals(scores)} Scenes without a prediction count as "
         "empty, never as absent. `-` stands where there is nothing to measure. What each metric "
         f"is: {page}."
     )
-    if ours and all(score.kind != "prediction" for score in scores):
+    if simulated and all(score.kind != "prediction" for score in scores):
         parts.append(
-            "**There are no networks yet.** `estimates` simulates what they will say: boxes, "
-            "categories, scores, layout and relations with known errors. The other rows say what "
-            "is made of that, so the differences between rows mean something and the levels do not."
+            "`estimates` simulates what networks say: boxes, categories, scores, layout and "
+            "relations with known errors. The other rows say what is made of that, so the "
+            "differences between rows mean something and the levels do not. What the real networks "
+            "reach is in RESULTS.md of the repository."
         )
-    elif ours:
+    elif simulated:
         parts.append(
             "`estimates` simulates networks: boxes, categories, scores, layout and relations with "
             "known errors."
+        )
+    elif rendered:
+        parts.append(
+            "The photos are rendered. No home of the test parts was in the training; `test-unseen` "
+            "has furniture that was not there either. Every row but the oracles sees the photo and "
+            "the height of its camera alone."
         )
     rows = [[f"`{score.method}`", score.kind, score.description] for score in scores]
     return [
@@ -179,7 +198,9 @@ def _intervals(scores: Sequence[ScoreFile]) -> str:
     counts = sorted({score.replicates for score in scores if score.replicates})
     if not counts:
         return "There are no intervals: the scores were made with `--replicates 0`."
-    files = "`results/*.json`" if are_simulated(scores) else "the files of scores"
+    files = "the files of scores"
+    if are_simulated(scores) or are_rendered(scores):
+        files = f"`results/{'simulated/' if are_simulated(scores) else ''}*.json`"
     without = [f"`{score.method}`" for score in scores if not score.replicates]
     none = f" (none for {', '.join(without)})" if without else ""
     return (

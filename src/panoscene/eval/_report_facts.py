@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 from panoscene.eval._fov import FOV_DEG
+from panoscene.eval._methods import METHODS
+from panoscene.eval._rendered_rows import RENDERED, ROWS
 from panoscene.eval._results import ScoreFile
 from panoscene.scene import CATEGORIES
 
@@ -44,6 +46,18 @@ def are_simulated(scores: Sequence[ScoreFile]) -> bool:
     return scores[0].data.startswith("sampled rooms") and any(
         score.method == "estimates" and score.kind == "input" for score in scores
     )
+
+
+def are_rendered(scores: Sequence[ScoreFile]) -> bool:
+    """Return whether these are the rows of our pipeline on homes that we rendered."""
+    return scores[0].data.startswith(RENDERED)
+
+
+def in_order(scores: Sequence[ScoreFile]) -> list[ScoreFile]:
+    """Return scores in the order of our rows, others after them."""
+    names = list(ROWS if scores and are_rendered(scores) else METHODS)
+    order = {name: place for place, name in enumerate(names)}
+    return sorted(scores, key=lambda score: order.get(score.method, len(order)))
 
 
 def truth_row(scores: Sequence[ScoreFile]) -> ScoreFile | None:

@@ -1,4 +1,4 @@
-"""The networks of the four stages: what they are built of, and files with their weights."""
+"""The networks of the stages: what they are built of, and files with their weights."""
 
 from ._backbone import Backbone as Backbone
 from ._backbone import BackboneName as BackboneName

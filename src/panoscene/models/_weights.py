@@ -29,7 +29,7 @@ class WeightsHeader(BaseModel):
 
     schema_version: Annotated[int, Field(alias="schema")] = SCHEMA
     stage: str
-    """detector, layout, pose or shape."""
+    """detector, layout, pose, shape or context."""
     edition: Edition
     config: dict[str, Any] = {}
     """What the network was built from."""

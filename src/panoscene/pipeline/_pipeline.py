@@ -15,6 +15,7 @@ from panoscene.models.layout import LayoutPrediction
 from panoscene.scene import (
     Detections,
     Layout,
+    Objects,
     Panorama,
     Relations,
     Scene,
@@ -22,27 +23,26 @@ from panoscene.scene import (
     upright_photo,
 )
 
+from ._flags import photo_flags, scene_flags
 from ._records import Given, Reconstruction
+from ._settings import PHOTO
+from ._sphere import sphere_gaps
 from ._stages import Stages
 
 SIZE = (512, 1024)
 """Rows and columns of the panorama that the networks see."""
 LEAST_TILT = math.radians(0.5)
 """Radians; a photo that leans less is taken as it is, for its estimate errs by as much."""
-TOLD_TILT = math.radians(3.0)
-"""Radians; from here on the user is told that the camera leant."""
-WEAK_WALL = 0.4
-"""Mean confidence of the walls below which a room may be none."""
 
 
 class Pipeline:
-    """Photos to scenes: upright, detections, layout, boxes, relations, arrangement, shapes.
+    """Photos to scenes: upright, detections, layout, boxes and relations, arrangement, shapes.
 
     Source: paper, Section 3 and Figure 2.
     """
 
     def __init__(
-        self, stages: Stages, *, settings: ArrangementSettings | str | None = "default"
+        self, stages: Stages, *, settings: ArrangementSettings | str | None = PHOTO
     ) -> None:
         """Put a pipeline together.
 
@@ -52,6 +52,16 @@ class Pipeline:
         """
         self._stages = stages
         self._settings = settings
+
+    @property
+    def stages(self) -> Stages:
+        """Return the stages, to make another pipeline of some of them."""
+        return self._stages
+
+    @property
+    def settings(self) -> ArrangementSettings | str | None:
+        """Return what the arrangement was told; None where it is left out."""
+        return self._settings
 
     @torch.inference_mode()
     def __call__(
@@ -79,40 +89,40 @@ class Pipeline:
         clock = _Clock()
         given = given or Given()
         panorama = panorama or Panorama(image.shape[-1], image.shape[-2])
-        doubts: list[str] = []
         with clock("upright"):
-            panorama = self._levelled(image, panorama, doubts)
-            seen = upright_photo(_reduced(image), panorama)
+            reduced = _reduced(image)
+            gaps = sphere_gaps(reduced)
+            panorama, tilt = self._levelled(reduced, panorama, given)
+            seen = upright_photo(reduced, panorama)
         found = self._detected(seen, given, clock)
         read, layout = self._read_layout(seen, panorama, given, clock)
-        with clock("pose"):
-            objects = given.objects
-            if objects is None:
-                height = panorama.camera_height
-                objects = self._stages.pose(seen, found, layout, height)
-        initial = Scene(panorama, layout, objects, given.relations, name)
+        objects, relations = given.objects, None
+        if objects is None:
+            with clock("pose" if self._stages.context is None else "context"):
+                objects, relations = self._placed(seen, found, layout, panorama.camera_height)
+        initial = Scene(panorama, layout, objects, given.relations or relations, name)
         scene, certificate = self._arranged(initial, clock)
         if self._stages.shape is not None:
             with clock("shape"):
                 shapes = self._stages.shape(seen, scene.objects, resolution=resolution)
                 scene = replace(scene, objects=replace(scene.objects, shapes=shapes))
-        doubts += _doubts(read, layout, scene)
-        return Reconstruction(scene, initial, seen, certificate, read, clock.seconds, tuple(doubts))
+        flags = photo_flags(gaps, tilt) + scene_flags(read, layout, scene)
+        return Reconstruction(scene, initial, seen, certificate, read, clock.seconds, flags)
 
     def _levelled(
-        self, image: Float[Tensor, "3 height width"], panorama: Panorama, doubts: list[str]
-    ) -> Panorama:
-        """Return the panorama with the rotation that makes its photo upright."""
+        self, image: Float[Tensor, "3 rows columns"], panorama: Panorama, given: Given
+    ) -> tuple[Panorama, float]:
+        """Return the panorama with the rotation that makes its photo upright, and the tilt."""
+        if given.upright_from_photo is not None:
+            return replace(panorama, upright_from_photo=given.upright_from_photo), 0.0
         if self._stages.leveller is None:
-            return panorama
-        estimate = self._stages.leveller(_reduced(image))
+            return panorama, 0.0
+        estimate = self._stages.leveller(image)
         # an uncertain estimate says that the tilt is 0
         if estimate.tilt < LEAST_TILT:
-            return panorama
-        if estimate.tilt >= TOLD_TILT:
-            degrees = math.degrees(estimate.tilt)
-            doubts.append(f"the camera was tilted by {degrees:.0f} degrees; the photo was turned")
-        return replace(panorama, upright_from_photo=estimate.upright_from_photo)
+            return panorama, 0.0
+        turned = replace(panorama, upright_from_photo=estimate.upright_from_photo)
+        return turned, estimate.tilt
 
     def _detected(
         self, image: Float[Tensor, "3 height width"], given: Given, clock: "_Clock"
@@ -137,6 +147,18 @@ class Pipeline:
         with clock("layout"):
             read = self._stages.layout(image, camera_height=panorama.camera_height)
         return read, read.layout
+
+    def _placed(
+        self,
+        image: Float[Tensor, "3 height width"],
+        found: Detections,
+        layout: Layout,
+        camera_height: float,
+    ) -> tuple[Objects, Relations | None]:
+        """Return boxes, and relations where a stage says more than what follows from the boxes."""
+        if self._stages.context is None:
+            return self._stages.pose(image, found, layout, camera_height), None
+        return self._stages.context(image, found, layout, camera_height)
 
     def _arranged(self, scene: Scene, clock: "_Clock") -> tuple[Scene, Certificate | None]:
         """Return the arranged scene with the relations of its boxes."""
@@ -178,15 +200,3 @@ def _relations(scene: Scene, inside: str) -> Relations:
         return relations_from_boxes(boxes, scene.layout, height)
     # boxes that are wrong by more than a tolerance are inside if a corner of them is
     return relations_from_boxes(boxes, scene.layout, height, inside="any_corner")
-
-
-def _doubts(read: LayoutPrediction | None, layout: Layout, scene: Scene) -> list[str]:
-    """Return what a user should know before using the result."""
-    doubts = []
-    if read is not None and read.ambiguous:
-        doubts.append("the room can be read in two ways, perhaps because of an open doorway")
-    if layout.wall_score is not None and float(layout.wall_score.mean()) < WEAK_WALL:
-        doubts.append("the walls are uncertain: this may not be a room, or not an indoor photo")
-    if len(scene.objects.boxes) == 0:
-        doubts.append("no object was found")
-    return doubts

@@ -1,6 +1,7 @@
 """What goes into a pipeline beside the photo, and what comes out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from jaxtyping import Float
 from torch import Tensor
@@ -22,7 +23,30 @@ class Given:
     objects: Objects | None = None
     """Boxes for the arrangement to start from; no detector and no pose network is run."""
     relations: Relations | None = None
-    """Relations for the arrangement, instead of those that follow from its first boxes."""
+    """Relations for the arrangement, instead of those that the networks or its first boxes say."""
+    upright_from_photo: tuple[tuple[float, float, float], ...] | None = None
+    """Rotation that makes the photo upright; no tilt is looked for."""
+
+
+FlagCode = Literal["not_full_sphere", "tilted", "ambiguous_layout", "not_indoors", "nothing_found"]
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """Something that a user should know before using a result."""
+
+    code: FlagCode
+    """For programs. ``not_full_sphere``: a part of the sphere is plain, blurred or stretched.
+    ``tilted``: the camera was, and the photo was turned. ``ambiguous_layout``: the room can be read
+    in two ways. ``not_indoors``: the walls are uncertain. ``nothing_found``: no object."""
+    text: str
+    """For people: part of a sentence."""
+    numbers: dict[str, float] = field(default_factory=dict[str, float])
+    """What it was concluded from, by name; angles in degrees, their names end in ``_deg``."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {"code": self.code, "text": self.text, "numbers": dict(self.numbers)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,5 +65,10 @@ class Reconstruction:
     """The layout with the signals that it was read from; None when it was given."""
     timings: dict[str, float]
     """Seconds for each stage that was run, in order."""
-    doubts: tuple[str, ...] = ()
-    """What the result should not be trusted for, in words; empty when nothing was noticed."""
+    flags: tuple[Flag, ...] = ()
+    """What the result should not be trusted for; empty when nothing was noticed."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The flags in words."""
+        return tuple(flag.text for flag in self.flags)

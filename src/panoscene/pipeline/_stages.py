@@ -8,7 +8,7 @@ from torch import Tensor
 
 from panoscene.models.layout import LayoutPrediction
 from panoscene.models.upright import UprightEstimate
-from panoscene.scene import Detections, Layout, Objects, Shapes
+from panoscene.scene import Detections, Layout, Objects, Relations, Shapes
 
 
 @runtime_checkable
@@ -56,6 +56,21 @@ class PoseEstimator(Protocol):
 
 
 @runtime_checkable
+class ContextEstimator(Protocol):
+    """Places what was detected, and says how it is related."""
+
+    def __call__(
+        self,
+        image: Float[Tensor, "3 height width"],
+        detections: Detections,
+        layout: Layout,
+        camera_height: float,
+    ) -> tuple[Objects, Relations | None]:
+        """Return an oriented box for each detection, in their order, and relations if it can."""
+        ...
+
+
+@runtime_checkable
 class ShapeEstimator(Protocol):
     """Gives objects their shapes."""
 
@@ -77,3 +92,5 @@ class Stages:
     """Without it, objects have no meshes and are drawn as boxes."""
     leveller: Leveller | None = None
     """Without it, photos are taken as upright."""
+    context: ContextEstimator | None = None
+    """Without it, boxes are those of the pose stage, and relations follow from them."""

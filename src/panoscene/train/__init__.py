@@ -8,6 +8,8 @@ from ._errors import TrainError as TrainError
 from ._loop import TrainResult as TrainResult
 from ._loop import train as train
 from ._precompute import precompute as precompute
+from ._precompute_estimates import file_hash as file_hash
+from ._precompute_estimates import precompute_estimates as precompute_estimates
 from ._recipe import STAGES as STAGES
 from ._recipe import Stage as Stage
 from ._recipe import TrainRecipe as TrainRecipe

@@ -19,6 +19,7 @@ from panoscene.data._detector_samples import (
     collate_detector,
 )
 from panoscene.data._detector_truth import SeenObjects, repeated_items, seen_objects
+from panoscene.models import read_weights
 from panoscene.models.detector import (
     CONFIGS,
     DetectorStage,
@@ -86,11 +87,13 @@ class DetectorTask(Task):
             train, config, self.options.rules, cached=self.options.cached
         )
         self.validation = open_dataset(data, "val")[:]
-        start = recipe.imagenet and self.options.coco is None
-        self.network = build_detector(config, imagenet=start)
+        others = recipe.start is not None or self.options.coco is not None
+        self.network = build_detector(config, imagenet=recipe.imagenet and not others)
         self.model = self.network
         if self.options.coco is not None:
             load_coco_weights(self.network, self.options.coco)
+        if recipe.start is not None:
+            read_weights(recipe.start, self.network, stage="detector", edition=recipe.edition)
         self._seen: list[_Seen] = []
 
     def sample_count(self) -> int:

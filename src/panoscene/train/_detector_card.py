@@ -45,6 +45,14 @@ def detector_card(
         f"| {words(name)} | {100 * value:.1f} |"
         for name, value in sorted(by_category.items(), key=lambda pair: (-pair[1], pair[0]))
     ]
+    earlier = (
+        [
+            "- It went on from weights of an earlier, shorter training, which are not published: "
+            "recipe and seed alone do not give these weights."
+        ]
+        if recipe.get("start")
+        else []
+    )
     return "\n".join(
         (
             "# Detector, compact edition",
@@ -83,10 +91,7 @@ def detector_card(
             "## Limits",
             "",
             "- It has seen rendered rooms only. On photos it misses more and is less sure.",
-            "- The training was stopped, changed and resumed by hand: recipe and seed alone do not "
-            "give these weights.",
-            "- Large objects near the camera (wardrobes, beds, sofas) are often missed: they are "
-            "rare in the training part, and the training was short.",
+            *earlier,
             "- Rare categories and objects below some 10 pixels at 1024 columns are mostly missed.",
             "- Nothing is found near the zenith and the nadir.",
             "- A mirror shows objects twice, and so does the detector.",

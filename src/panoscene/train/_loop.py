@@ -246,7 +246,10 @@ class _Training:
         if best is None or scores[SELECTION] > best:
             header = self._header(scores)
             write_weights(self.folder / BEST, task.model, header, half=False)
-            write_weights(self.folder / WEIGHTS, task.model, header)
+            for stage, (part, config) in (task.parts() or {recipe.stage: (task.model, {})}).items():
+                path = self.folder / (WEIGHTS if stage == recipe.stage else f"{stage}.safetensors")
+                changes = {"stage": stage, "config": config or header.config}
+                write_weights(path, part, header.model_copy(update=changes))
         return float(scores[SELECTION])
 
     def _header(self, scores: Mapping[str, float]) -> WeightsHeader:

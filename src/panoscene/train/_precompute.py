@@ -84,15 +84,20 @@ def stage_record(
     return StageRecord(found, room.layout, room.ambiguous)
 
 
-def begin_records(output: Path, header: Mapping[str, str]) -> None:
+def begin_records(output: Path, header: Mapping[str, str], folder: str = RECORDS) -> None:
     """Make the folder of the records, or check that it is of the same stages and data.
+
+    Args:
+        output: Where precompute.json is.
+        header: What the records are made with.
+        folder: Of the records, in ``output``.
 
     Raises:
         TrainError: It is of others, or no folder.
     """
     if output.exists() and not output.is_dir():
         raise TrainError(output, "found a file, expected a folder")
-    (output / RECORDS).mkdir(parents=True, exist_ok=True)
+    (output / folder).mkdir(parents=True, exist_ok=True)
     file = output / HEADER
     if file.is_file():
         try:

@@ -11,7 +11,7 @@ from panoscene.models import Edition
 
 from ._errors import TrainError
 
-Stage = Literal["detector", "layout", "pose", "shape"]
+Stage = Literal["detector", "layout", "pose", "shape", "context"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 """The stages that are trained, in the order in which they need each other."""
 Precision = Literal["auto", "32-true", "bf16-mixed"]

@@ -89,7 +89,7 @@ class ShapeTask(Task):
             if recipe.data is None:
                 raise TrainError("recipe", "data: found none, expected the folder of a data set")
             prepare_shape_data(recipe.data, assets, folder)
-        self.shapes = read_store(folder / MODELS)
+        self.shapes = read_store(folder / MODELS, assets)
         if not self.shapes:
             raise TrainError(folder / MODELS, "found no models, expected some .npz files")
         entries = load_library(assets).entries

@@ -62,6 +62,14 @@ class Task(ABC):
         """Return what the network was built from, for the header of its weights."""
         return {}
 
+    def parts(self) -> dict[str, tuple[nn.Module, dict[str, Any]]]:
+        """Return the networks of stages that the model consists of, with their ``config``.
+
+        By stage, where the model is no network of a stage itself; they get files with weights of
+        their own: weights.safetensors for the recipe's stage, STAGE.safetensors for others.
+        """
+        return {}
+
     def rate(self, parameter: str) -> float:
         """Return the factor of a parameter's learning rate; 0 keeps the parameter as it is."""
         del parameter

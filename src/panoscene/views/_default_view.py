@@ -1,15 +1,17 @@
 """A good place to look into a room from."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int64
 
 from panoscene.geometry import box_corners, direction_from_lonlat, polygon_turn
 from panoscene.scene import Scene
 from panoscene.views._cameras import FreeCamera, fitting_camera, free_lens
-from panoscene.views._model import build_model
+from panoscene.views._model import front_marks, is_seen
+from panoscene.views._rays import RayCaster, checked_surfaces, join_surfaces
 
 _FOV_DEG = 34.0
 _LOOK_DOWN_DEG = 38.0
@@ -43,11 +45,12 @@ def default_view(
         raise ValueError(f"look_down_deg: found {look_down_deg}, expected -90 to 90 degrees")
     points = _extent(scene)
     lat, turn = -math.radians(look_down_deg), -polygon_turn(scene.layout.floor_polygon)
+    shown = _Shown(scene)
     best, most = None, -1.0
     for lon in (np.arange(_AROUND) + 0.37) * (2 * math.pi / _AROUND):
         ahead = direction_from_lonlat(torch.tensor([lon, lat], dtype=torch.float64))
         camera = fitting_camera(ahead, points, _FOV_DEG, size_px)
-        worth = _worth(scene, camera, size_px) * (1 + _CORNER * abs(math.sin(2 * (lon + turn))))
+        worth = _worth(shown, camera, size_px) * (1 + _CORNER * abs(math.sin(2 * (lon + turn))))
         if worth > most:
             best, most = camera, worth
     if best is None:
@@ -66,19 +69,57 @@ def _extent(scene: Scene) -> Float[np.ndarray, "points 3"]:
     return np.concatenate([room, corners[((corners >= low) & (corners <= high)).all(-1)]])
 
 
-def _worth(scene: Scene, camera: FreeCamera, size_px: tuple[int, int]) -> float:
+class _Shown:
+    """What cameras see of the objects of one scene; the objects are sorted for rays only once."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        surfaces = checked_surfaces(scene)
+        self._objects = tuple(surface for surface in surfaces if surface.kind == "object")
+        self._room = tuple(surface for surface in surfaces if surface.kind != "object")
+        self._sorted: dict[tuple[int, ...], _Targets] = {}
+
+    def along(self, eye: Float[np.ndarray, " 3"], rays: Float[np.ndarray, "n 3"]) -> "_Seen":
+        """Return the objects that rays from a camera hit first, and whether at their fronts."""
+        start = np.ascontiguousarray(np.broadcast_to(eye.astype(np.float32), rays.shape))
+        targets = self._targets(eye)
+        room = RayCaster(join_surfaces([s for s in self._room if is_seen(s, self._scene, eye)]))
+        face, distance = targets.caster.first_and_distance(start, rays)
+        face = face[(face >= 0) & (distance < room.first_and_distance(start, rays)[1])]
+        return targets.item[face], targets.front[face]
+
+    def _targets(self, eye: Float[np.ndarray, " 3"]) -> "_Targets":
+        seen = [surface for surface in self._objects if is_seen(surface, self._scene, eye)]
+        key = tuple(surface.index for surface in seen)
+        if key not in self._sorted:
+            soup = join_surfaces(seen)
+            item = np.array(key, np.int64)[soup.surface]
+            mark = front_marks(self._scene, soup.normal, item)[2]
+            self._sorted[key] = _Targets(RayCaster(soup), item, mark < 0)
+        return self._sorted[key]
+
+
+_Seen = tuple[Int64[np.ndarray, " hits"], Bool[np.ndarray, " hits"]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Targets:
+    """Triangles of objects."""
+
+    caster: RayCaster
+    item: Int64[np.ndarray, " faces"]
+    """Index of the object."""
+    front: Bool[np.ndarray, " faces"]
+    """Whether it is on the front of a box."""
+
+
+def _worth(shown: _Shown, camera: FreeCamera, size_px: tuple[int, int]) -> float:
     """Return how much a camera shows of the objects: what is seen of each, and fronts twice."""
     columns = _COLUMNS
     rows = max(1, round(columns * size_px[1] / size_px[0]))
     lens = free_lens(camera, (columns, rows))
-    model = build_model(scene, lens.eye, cut=False)
     v, u = np.meshgrid(np.arange(rows) + 0.5, np.arange(columns) + 0.5, indexing="ij")
-    rays = lens.directions(u.ravel(), v.ravel()).astype(np.float32)
-    eye = np.ascontiguousarray(np.broadcast_to(lens.eye.astype(np.float32), rays.shape))
-    face = model.caster.first(eye, rays)
-    face = face[face >= 0]
-    face = face[model.item[face] >= 0]
-    weight = np.where(model.mark[face] < 0, 2.0, 1.0)
-    pixels = np.bincount(model.item[face], weight, minlength=1)
+    item, front = shown.along(lens.eye, lens.directions(u.ravel(), v.ravel()).astype(np.float32))
+    pixels = np.bincount(item, np.where(front, 2.0, 1.0), minlength=1)
     # a large object counts for less than several small ones of the same size together
     return float(np.sqrt(pixels).sum())

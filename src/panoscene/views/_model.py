@@ -6,10 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 import torch
-import trimesh
 from jaxtyping import Bool, Float, Int32, Int64
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from panoscene.geometry import box_contains
 from panoscene.scene import CATEGORIES, Layout, Scene, Surface
@@ -23,10 +20,9 @@ from panoscene.style import (
     WALL_THICKNESS,
     group_of,
 )
+from panoscene.views._facets import facets
 from panoscene.views._rays import RayCaster, Soup, checked_surfaces, join_surfaces
 
-_CREASE = np.radians(35.0)
-"""Neighbouring triangles at a larger angle are separated by a line."""
 _LONGEST_MITRE = 3.0
 """Of wall corners, in wall thicknesses."""
 _FRONT_TINT = 0.16
@@ -69,7 +65,7 @@ def build_model(scene: Scene, eye: Float[np.ndarray, " 3"], *, cut: bool) -> Mod
         eye: where the camera is.
         cut: whether walls get their thickness, as if the room was cut open.
     """
-    surfaces = [surface for surface in checked_surfaces(scene) if _is_seen(surface, scene, eye)]
+    surfaces = [surface for surface in checked_surfaces(scene) if is_seen(surface, scene, eye)]
     seen = {surface.index for surface in surfaces if surface.kind == "wall"}
     trims = wall_cuts(scene.layout, seen) if cut else ()
     if cut:
@@ -82,13 +78,13 @@ def build_model(scene: Scene, eye: Float[np.ndarray, " 3"], *, cut: bool) -> Mod
     items = [s.index if s.kind == "object" else -1 for s in kept]
     colours = np.array([_colour(s, scene) for s in surfaces] + [rgb(WALL)] * len(trims))
     item = np.repeat(np.array(items, np.int64), count)
-    across, behind, mark, front = _front_marks(scene, soup.normal, item)
+    across, behind, mark, front = front_marks(scene, soup.normal, item)
     colour = np.repeat(colours.reshape(-1, 3), count, axis=0)
     colour = np.where(front[:, None], _mix(colour, rgb(INK), _FRONT_TINT), colour)
     return Model(
         soup,
         RayCaster(soup),
-        _facets(soup),
+        facets(soup),
         colour.astype(np.float32),
         np.repeat(np.array(kinds, np.int32), count),
         item,
@@ -131,7 +127,8 @@ def _points(values: Float[np.ndarray, "points 3"]) -> torch.Tensor:
     return torch.as_tensor(values, dtype=torch.float32)
 
 
-def _is_seen(surface: Surface, scene: Scene, eye: Float[np.ndarray, " 3"]) -> bool:
+def is_seen(surface: Surface, scene: Scene, eye: Float[np.ndarray, " 3"]) -> bool:
+    """Return whether a surface is drawn: walls that face the camera, boxes not around it."""
     if surface.kind == "object":
         if not _is_box(scene, surface.index):
             return True
@@ -174,7 +171,7 @@ def _colour(surface: Surface, scene: Scene) -> Float[np.ndarray, " 3"]:
     return _mix(rgb(FLOOR), rgb(WALL), ink)
 
 
-def _front_marks(
+def front_marks(
     scene: Scene, normal: Float[np.ndarray, "faces 3"], item: Int64[np.ndarray, " faces"]
 ) -> tuple[
     Float[np.ndarray, "faces 4"],
@@ -208,16 +205,6 @@ def _front_marks(
     mark[own] = np.where(is_front, -length, np.where(is_top, length, 0.0))
     fronts[own] = is_front
     return across, behind, mark, fronts
-
-
-def _facets(soup: Soup) -> Int32[np.ndarray, " faces"]:
-    mesh = trimesh.Trimesh(soup.vertices, soup.faces, process=False, validate=False)
-    if len(soup.faces) < 2:
-        return np.arange(len(soup.faces), dtype=np.int32)
-    flat = mesh.face_adjacency[mesh.face_adjacency_angles < _CREASE]
-    count = len(soup.faces)
-    graph = coo_array((np.ones(len(flat), bool), (flat[:, 0], flat[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
 
 
 def rgb(colour: str) -> Float[np.ndarray, " 3"]:

@@ -5,8 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import KDTree
 
-from panoscene.synth.assets import AssetError, CadModel, Material, close_surface, sample_shape
+from panoscene.synth.assets import (
+    AssetError,
+    CadModel,
+    ClosedSurface,
+    Material,
+    close_surface,
+    sample_shape,
+)
 from panoscene.synth.assets._shape_files import is_closed, read_shape, write_shape
 
 for package in ("skimage", "fast_simplification"):
@@ -77,6 +85,50 @@ def test_a_sheet_gets_a_thickness_and_keeps_its_outline() -> None:
     )
     assert is_closed(surface.faces)
     assert surface.inside(np.zeros((1, 3))).all()
+
+
+def shown(surface: ClosedSurface, places: np.ndarray) -> bool:
+    """Return whether places of a body are in it or within a voxel and a half of its surface."""
+    away = np.asarray(KDTree(surface.vertices).query(places)[0])
+    return bool((surface.inside(places) | (away < 1.5 / 96)).all())
+
+
+@pytest.mark.parametrize("thick", [0.004, 0.012, 0.02, 0.05])
+def test_thin_parts_stay_and_thick_ones_keep_their_size(thick: float) -> None:
+    parts = [trimesh.creation.box((1.2, 0.7, thick))]
+    for x in (-0.5, 0.5):
+        for y in (-0.3, 0.3):
+            leg = trimesh.creation.box((2 * thick, 2 * thick, 0.7))
+            leg.apply_translation((x, y, -0.35 + thick / 2))
+            parts.append(leg)
+    table = trimesh.util.concatenate(parts)
+    assert isinstance(table, trimesh.Trimesh)
+    surface = close_surface(model(table), 96)
+    assert is_closed(surface.faces)
+    mesh = trimesh.Trimesh(surface.vertices * surface.scale, surface.faces, process=False)
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([1.2, 0.7, 0.7], abs=0.01)
+    middle = (table.vertices.min(axis=0) + table.vertices.max(axis=0)) / 2
+    for part in parts:  # no piece of it is missing
+        axis = part.bounds.mean(axis=0) - middle
+        along = np.linspace(-0.45, 0.45, 60)[:, None] * np.ptp(part.bounds, axis=0)
+        long = along * (np.ptp(part.bounds, axis=0) > 0.5)
+        assert shown(surface, (axis + long) / surface.scale)
+    if thick > 2.5 * 1.2 / 96:
+        assert mesh.volume == pytest.approx(sum(part.volume for part in parts), rel=0.1)
+
+
+def test_a_sheet_before_a_body_stays() -> None:
+    for gap in (0.012, 0.02, 0.03, 0.05):
+        sheet = trimesh.creation.box((0.6, 0.0005, 0.1))
+        sheet.apply_translation((0, 0.25 + gap, 0))
+        both = trimesh.util.concatenate([trimesh.creation.box((1, 0.5, 0.3)), sheet])
+        assert isinstance(both, trimesh.Trimesh)
+        surface = close_surface(model(both), 96)
+        x, z = np.meshgrid(np.linspace(-0.28, 0.28, 30), np.linspace(-0.04, 0.04, 9))
+        places = np.stack([x, np.full_like(x, 0.25 + gap), z], axis=-1).reshape(-1, 3)
+        assert shown(surface, places - (0, gap / 2, 0))
+        volume = trimesh.Trimesh(surface.vertices, surface.faces, process=False).volume
+        assert volume < 0.15 + 0.6 * 0.1 * max(1.6 * 2 / 96, gap + 2 / 96) + 0.003
 
 
 def test_shapes_are_written_and_read(tmp_path: Path) -> None:

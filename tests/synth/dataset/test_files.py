@@ -140,6 +140,20 @@ def test_another_recipe_needs_another_folder(tmp_path: Path):
         begin_dataset(other, recipe_of())
 
 
+def test_a_set_of_other_homes_is_not_continued(tmp_path: Path):
+    index = begin_dataset(tmp_path, recipe_of())
+    assert index.homes_version > 1
+    file = tmp_path / "dataset.json"
+    begun = f'"homes_version": {index.homes_version}'
+    text = file.read_text()
+    assert begun in text
+    file.write_text(text.replace(begun, '"homes_version": 1'))
+    with pytest.raises(DatasetError, match="homes of version 1"):
+        begin_dataset(tmp_path, recipe_of())
+    file.write_text(text.replace(f"{begun},", ""))  # as sets were written before
+    assert read_index(tmp_path).homes_version == 1
+
+
 def test_the_split_is_frozen(small_set: Path):
     index = read_index(small_set)
     assert {entry.home: entry.split for entry in index.homes} == {

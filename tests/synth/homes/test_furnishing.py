@@ -87,7 +87,8 @@ def _rooms() -> list[Home]:
 
 
 def test_every_category_occurs() -> None:
-    homes = [*_many(), *_rooms(), _large_room("child", 1)]
+    more: list[tuple[RoomKind, int]] = [("child", 1), ("kitchen", 1), ("kitchen", 2), ("living", 1)]
+    homes = [*_many(), *_rooms(), *(_large_room(kind, seed) for kind, seed in more)]
     statistics = home_statistics(homes, LIBRARY)
     assert [name for name in CATEGORIES if statistics.categories[name] == 0] == []
     assert 11.0 < home_statistics(_many(), LIBRARY).objects_mean < 20.0

@@ -57,6 +57,20 @@ def test_a_cache_with_other_models_keeps_them(tmp_path: Path) -> None:
     np.testing.assert_allclose(Models(tmp_path, 0)["mine/basket"].vertices, own.vertices)
 
 
+def test_cupboards_without_a_top_are_not_taken_but_shelves_have_boards(tmp_path: Path) -> None:
+    made = make_model("bottom_cabinet_no_top", 3, 0)
+    corners = made.vertices[made.faces]
+    up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] > 1e-9
+    high = corners[..., 2].mean(axis=1) > 0.8 * made.vertices[:, 2].max()
+    faces, of = made.faces[~(up & high)], made.face_material[~(up & high)]
+    open_ = replace(made, id="mine/open", base="mine/open", faces=faces, face_material=of)
+    add_models(tmp_path, [made, open_, make_model("shelf", 1, 0)])
+    models = Models(tmp_path, 0)
+    assert "mine/open" in models
+    assert list(models.entries_of("seen")) == [made.id, "parametric/shelf/1"]
+    assert len(models.summaries("seen").boards["parametric/shelf/1"]) > 1
+
+
 def home_with(opening: Opening) -> Home:
     room = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)])
     return Home(0, (Room("living", room, 2.6),), (opening,), (), wall_thickness=0.12)

@@ -15,7 +15,7 @@ from panoscene.scene import CATEGORIES, Detections, Layout, Objects
 
 from ._clues import pose_clues
 from ._config import CONFIGS, PoseConfig
-from ._network import PoseNetwork, build_pose
+from ._network import PoseNetwork, PoseOutput, build_pose
 
 STAGE = "pose"
 """Name of this stage in files with weights."""
@@ -61,11 +61,24 @@ class PoseStage:
         Raises:
             ValueError: The camera is not above the floor.
         """
+        encoded = self.encoded(image, detections)
+        return self.placed(encoded, detections, layout, camera_height)
+
+    @torch.inference_mode()
+    def encoded(
+        self, image: Float[Tensor, "3 height width"], detections: Detections
+    ) -> Float[Tensor, "n features"]:
+        """Return the encoded crop of each detection, where the network is.
+
+        Args:
+            image: As in a call.
+            detections: As in a call.
+        """
         device = self.network.mean_size.device
-        crops = pose_crops(
-            image.to(device), detections.bfov.to(device), self.network.config.crop_px
+        crop_px = self.network.config.crop_px
+        return self.network.encoded(
+            pose_crops(image.to(device), detections.bfov.to(device), crop_px)
         )
-        return self.placed(self.network.encoded(crops), detections, layout, camera_height)
 
     @torch.inference_mode()
     def placed(
@@ -78,7 +91,29 @@ class PoseStage:
         """Return what a call returns, for crops that are encoded already.
 
         Args:
-            encoded: From the network and ``pose_crops``.
+            encoded: From ``encoded``.
+            detections: As in a call.
+            layout: As in a call.
+            camera_height: As in a call.
+
+        Raises:
+            ValueError: The camera is not above the floor.
+        """
+        output = self.output(encoded, detections, layout, camera_height)
+        return self.decoded(output, detections, camera_height)
+
+    @torch.inference_mode()
+    def output(
+        self,
+        encoded: Float[Tensor, "n features"],
+        detections: Detections,
+        layout: Layout | None,
+        camera_height: float,
+    ) -> PoseOutput:
+        """Return what the network says of one scene, batch shape (1, n).
+
+        Args:
+            encoded: From ``encoded``.
             detections: As in a call.
             layout: As in a call.
             camera_height: As in a call.
@@ -91,14 +126,27 @@ class PoseStage:
         device = self.network.mean_size.device
         bfov = detections.bfov.to(device, torch.float32)
         category = detections.category.to(device)
-        mean_size = self.network.mean_size[category]
         clues = None
         if self.network.config.clues:
+            mean_size = self.network.mean_size[category]
             clues = pose_clues(bfov, mean_size, camera_height, layout).unsqueeze(0)
         every = torch.ones_like(category, dtype=torch.bool)
-        output = self.network.placed(
+        return self.network.placed(
             encoded, bfov.unsqueeze(0), category.unsqueeze(0), every.unsqueeze(0), clues=clues
         )
+
+    def decoded(self, output: PoseOutput, detections: Detections, camera_height: float) -> Objects:
+        """Return the objects that the network's output describes.
+
+        Args:
+            output: Of one scene.
+            detections: It is of.
+            camera_height: As in a call.
+        """
+        device = self.network.mean_size.device
+        bfov = detections.bfov.to(device, torch.float32)
+        category = detections.category
+        mean_size = self.network.mean_size[category.to(device)]
         boxes = decode_box_code(
             output.code(), bfov.unsqueeze(0), mean_size.unsqueeze(0), camera_height
         )[0]

@@ -6,6 +6,7 @@ from ._config import ISO_LEVEL as ISO_LEVEL
 from ._config import ShapeConfig as ShapeConfig
 from ._elements import Elements as Elements
 from ._elements import analytic_code as analytic_code
+from ._elements import blob_centres as blob_centres
 from ._elements import elements_from_code as elements_from_code
 from ._extract import extract_meshes as extract_meshes
 from ._fast_field import FastField as FastField

@@ -93,6 +93,29 @@ def analytic_code(
     return parts[..., :ANALYTIC].reshape(len(code), -1)
 
 
+def blob_centres(
+    analytic: Float[Tensor, "*batch codes"],
+    size: Float[Tensor, "*batch 3"],
+    config: ShapeConfig,
+) -> Float[Tensor, "*batch blobs 3"]:
+    """Return where the Gaussians of shapes are in the canonical box [-1/2, 1/2]^3.
+
+    Mirrored ones follow the others.
+
+    Args:
+        analytic: From ``analytic_code``.
+        size: Of the boxes in metres; only matters where the longest side is the unit.
+        config: Of the network that the codes are from.
+    """
+    centre = analytic.unflatten(-1, (config.elements, ANALYTIC))[..., 1:4] / 2
+    twin = centre[..., : config.symmetric, :] * centre.new_tensor([-1.0, 1.0, 1.0])
+    centre = torch.cat([centre, twin], dim=-2)
+    if config.frame == "box":
+        return centre
+    least = size.clamp(min=1e-3)
+    return centre * (least.amax(dim=-1, keepdim=True) / least).unsqueeze(-2)
+
+
 def local_points(
     elements: Elements, points: Float[Tensor, "batch points 3"]
 ) -> Float[Tensor, "batch points elements 3"]:

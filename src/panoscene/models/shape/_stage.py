@@ -13,6 +13,7 @@ from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh
 
 from ._config import CONFIGS
 from ._extract import extract_meshes
+from ._fewer import FACES_PER_CELL, fewer_faces
 from ._network import ShapeNetwork, build_shape, view_hints
 
 THIN_METRES = 0.03
@@ -41,16 +42,19 @@ class ShapeStage:
         """Return codes and closed meshes of all objects, in the canonical box [-1/2, 1/2]^3.
 
         Thin objects get a slab: their box. So do, as ``box``, those whose predicted shape is empty.
+        Where a surface is flat its triangles are joined, until there are about 32 for each cell
+        along an axis: 2,048 at resolution 64.
 
         Args:
             image: Upright panorama, RGB in [0, 1].
             objects: Their BFoVs say where to look; boxes and categories are used, too.
-            resolution: Of the meshes: 32, 64, 128 or 256 cells along each axis.
+            resolution: Of the grid in which meshes are found: 32, 64, 128 or 256 cells along each
+                axis.
 
         Raises:
             ValueError: ``resolution`` is none of these.
 
-        Source: paper, Sec. 3.1; slabs are ours.
+        Source: paper, Sec. 3.1; slabs and fewer triangles are ours.
         """
         codes = self.codes(image, objects)
         network = (~thin_boxes(objects.boxes.size)).nonzero()[:, 0]
@@ -59,7 +63,8 @@ class ShapeStage:
         sources: list[ShapeSource] = ["slab"] * len(meshes)
         for index, mesh in zip(network.tolist(), found, strict=True):
             sources[index] = "box" if mesh is None else "network"
-            meshes[index] = meshes[index] if mesh is None else mesh
+            if mesh is not None:
+                meshes[index] = fewer_faces(mesh, FACES_PER_CELL * resolution)
         return Shapes(code=codes.cpu(), mesh=tuple(meshes), source=tuple(sources))
 
     @torch.inference_mode()

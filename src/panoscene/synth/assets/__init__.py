@@ -21,6 +21,7 @@ from ._records import LightSource as LightSource
 from ._records import Material as Material
 from ._records import MaterialKind as MaterialKind
 from ._records import Placement as Placement
+from ._shape_files import SHAPE_MARGIN as SHAPE_MARGIN
 from ._shape_files import ShapeSamples as ShapeSamples
 from ._shape_files import sample_shape as sample_shape
 from ._specs import ModelSpec as ModelSpec

@@ -31,7 +31,7 @@ from ._decimate import MAX_FACES
 from ._errors import AssetError
 from ._library import ModelLibrary, extended, load_library
 from ._materials import MtlEntry, parse_mtl
-from ._shape_files import read_shape, sample_shape, shape_file, write_shape
+from ._shape_files import SAMPLES, read_shape, sample_shape, shape_file, write_shape
 from ._specs import ModelSpec, folder_models, known_models
 from ._watertight import RESOLUTION
 
@@ -294,7 +294,7 @@ def prepare_shapes(
     *,
     progress: Progress | None = None,
     processes: int = 2,
-    samples: int = 50_000,
+    samples: int = SAMPLES,
     resolution: int = RESOLUTION,
 ) -> tuple[tuple[str, str], ...]:
     """Return id and reason of models whose signed distances could not be sampled, mostly none.

@@ -9,7 +9,7 @@ from tokenize import TokenError
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64
+from jaxtyping import Float16, Float32, Float64, Int32, Int64
 from scipy.spatial import KDTree
 
 from panoscene.scene import write_atomically
@@ -19,13 +19,22 @@ from ._errors import AssetError
 from ._records import CadModel
 from ._watertight import RESOLUTION, ClosedSurface, close_surface
 
-BOX = 0.7
-"""Uniform samples and the grid fill [-0.7, 0.7]^3 in units of the longest side."""
-BAND = 0.04375
-"""Near samples are within this of the surface: one cell of the grid."""
-GRID = 32
+SHAPE_MARGIN = 1.2
+"""Uniform samples fill the model's box, larger by this factor."""
+NEAR_BAND = 0.04375
+"""Near samples are within this of the surface, in units of the longest side."""
+GRID_NODES = 32
+"""Of the coarse grid along each axis, from -0.7 to 0.7."""
+SAMPLES = 16_384
+"""Near the surface, and again as many uniform ones."""
+_GRID_REACH = 0.7
+_LEAST = 1e-4
+_CLOSE = 0.75
+"""Voxels from the surface within which the field tells the distance."""
+_BESIDE = 0.4
+"""Voxels along the surface between a foot and the nearest vertex, about."""
 _MESH_FACES = 10_000
-_SHAPE_VERSION = 1
+_SHAPE_VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +47,13 @@ class ShapeSamples:
 
     vertices: Float32[np.ndarray, "vertices 3"]
     faces: Int32[np.ndarray, "faces 3"]
-    near: Float32[np.ndarray, "near 4"]
+    extent: Float32[np.ndarray, "3"]
+    """Of the box; the longest is 1."""
+    near: Float16[np.ndarray, "near 4"]
     """Points within 0.04375 of the surface, and their signed distance."""
-    uniform: Float32[np.ndarray, "uniform 4"]
-    """Points in [-0.7, 0.7]^3, and their signed distance."""
-    grid: Float32[np.ndarray, "32 32 32"]
+    uniform: Float16[np.ndarray, "uniform 4"]
+    """Points in the box, enlarged by 1.2, and their signed distance."""
+    grid: Float16[np.ndarray, "32 32 32"]
     """Signed distances at nodes from -0.7 to 0.7, x first."""
     scale: float
     """Metres per unit."""
@@ -56,7 +67,7 @@ def shape_file(identifier: str) -> str:
 def sample_shape(
     model: CadModel,
     rng: np.random.Generator,
-    samples: int = 50_000,
+    samples: int = SAMPLES,
     resolution: int = RESOLUTION,
 ) -> ShapeSamples:
     """Return the closed surface of a model and signed distances around it.
@@ -68,18 +79,22 @@ def sample_shape(
         resolution: Voxels along the longest side.
     """
     surface = close_surface(model, resolution)
+    extent = np.ptp(surface.vertices, axis=0)
     near = _near_points(surface, rng, samples)
-    uniform = rng.uniform(-BOX, BOX, (samples, 3))
-    axis = np.linspace(-BOX, BOX, GRID)
+    uniform = rng.uniform(-0.5, 0.5, (samples, 3)) * extent * SHAPE_MARGIN
+    axis = np.linspace(-_GRID_REACH, _GRID_REACH, GRID_NODES)
     nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance = signed_distances(surface, np.concatenate([near, uniform, nodes]))
+    points = np.concatenate([near, uniform]).astype(np.float16).astype(np.float64)
+    distance = signed_distances(surface, np.concatenate([points, nodes]))
+    signed = np.c_[points, distance[: 2 * samples]].astype(np.float16)
     vertices, faces = _lighter(surface)
     return ShapeSamples(
         vertices=vertices.astype(np.float32),
         faces=faces.astype(np.int32),
-        near=np.c_[near, distance[:samples]].astype(np.float32),
-        uniform=np.c_[uniform, distance[samples : 2 * samples]].astype(np.float32),
-        grid=distance[2 * samples :].reshape(GRID, GRID, GRID).astype(np.float32),
+        extent=extent.astype(np.float32),
+        near=signed[:samples],
+        uniform=signed[samples:],
+        grid=distance[2 * samples :].reshape((GRID_NODES,) * 3).astype(np.float16),
         scale=surface.scale,
     )
 
@@ -96,7 +111,7 @@ def _near_points(
     foot = np.einsum("nk,nkx->nx", rng.dirichlet((1, 1, 1), samples), corners[face])
     direction = rng.normal(size=(samples, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return foot + direction * rng.uniform(0, BAND, (samples, 1))
+    return foot + direction * rng.uniform(0, NEAR_BAND, (samples, 1))
 
 
 def signed_distances(
@@ -104,40 +119,19 @@ def signed_distances(
 ) -> Float64[np.ndarray, " n"]:
     """Return the distance of points to a closed surface, negative inside.
 
-    Exact near the surface, where the triangles with the nearest middles are tried; further than
-    about a cell of the grid away, too large by 1 percent at most.
+    Right to about a fifth of a voxel near the surface; further away than ten voxels, too large by
+    1 percent at most.
 
     Args:
         surface: To measure from.
         points: In its frame.
     """
-    corners = surface.vertices[surface.faces]
-    tree = KDTree(corners.mean(axis=1))
-    _, nearest = tree.query(points, eps=0.01)
-    best = _triangle_distance(points, corners[nearest])
-    close = np.flatnonzero(best < 1.2 * BAND)
-    if len(close):
-        for column in np.asarray(tree.query(points[close], 5)[1]).T:
-            here = _triangle_distance(points[close], corners[column])
-            best[close] = np.minimum(best[close], here)
-    return np.where(surface.inside(points), -best, best)
-
-
-def _triangle_distance(
-    points: Float64[np.ndarray, "n 3"], corners: Float64[np.ndarray, "n 3 3"]
-) -> Float64[np.ndarray, " n"]:
-    """Return the distance of each point to its own triangle."""
-    following = np.roll(corners, -1, axis=1)
-    along = following - corners
-    away = points[:, None] - corners
-    length = np.maximum(np.einsum("nkx,nkx->nk", along, along), 1e-30)
-    share = np.clip(np.einsum("nkx,nkx->nk", away, along) / length, 0, 1)
-    rim = np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1)
-    normal = np.cross(along[:, 0], along[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    height = np.einsum("nx,nx->n", away[:, 0], normal)
-    sides = np.einsum("nkx,nx->nk", np.cross(along, away), normal)
-    return np.where((sides >= 0).all(axis=1), np.abs(height), rim)
+    tree = KDTree(surface.vertices, balanced_tree=False, compact_nodes=False)
+    voxel = float(surface.step.mean())
+    beside = np.square(np.asarray(tree.query(points, eps=0.01)[0])) - (_BESIDE * voxel) ** 2
+    depth = surface.depth(points)
+    close = np.where(np.abs(depth) < _CLOSE * voxel, np.abs(depth), _LEAST)
+    return np.maximum(close, np.sqrt(beside.clip(min=0.0))) * np.where(depth < 0, -1, 1)
 
 
 def _lighter(

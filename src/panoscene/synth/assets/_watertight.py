@@ -5,17 +5,27 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 from scipy import ndimage
-from scipy.spatial import KDTree
 
 from ._records import CadModel
 
-RESOLUTION = 160
+RESOLUTION = 128
 """Voxels along the longest side."""
-_SHELL = 0.75
-"""The surface is laid this many voxels around the model's sheets."""
+_SHELL = 1.0
+"""Openings narrower than twice this many voxels are closed."""
+_COAT = 0.75
+"""Voxels by which sheets that bound nothing are thickened on both sides."""
 _MARGIN = 4
 _MIN_THICKNESS = 0.02
-_MAX_POINTS = 1_500_000
+_BODY = 0.7
+"""What is deeper than this somewhere, in voxels, is a body: its surface is where its sheets are."""
+_SKIN = 0.05
+_LEAST = 1e-3
+"""Nodes are at least this far from the surface, or marching cubes leaves cracks."""
+_FAR = 2.0
+"""Distances are known up to so many voxels."""
+_SPACING = 0.5
+"""Voxels between points on sheets, at most."""
+_MAX_POINTS = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +39,7 @@ class ClosedSurface:
     vertices: Float64[np.ndarray, "vertices 3"]
     faces: Int64[np.ndarray, "faces 3"]
     field: Float32[np.ndarray, "nx ny nz"]
-    """Negative inside; only its sign and zero level mean something."""
+    """Distance in nodes, negative inside; right within one node of the surface."""
     origin: Float64[np.ndarray, "3"]
     """Of the first node of the field."""
     step: Float64[np.ndarray, "3"]
@@ -37,20 +47,29 @@ class ClosedSurface:
     scale: float
     """Metres per unit."""
 
+    def depth(self, points: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
+        """Return about the signed distance of points within a voxel of the surface.
+
+        Further away only the sign means something: negative inside.
+        """
+        index = ((points - self.origin) / self.step).T
+        nodes = ndimage.map_coordinates(self.field, index, order=1, cval=_FAR)
+        return nodes.astype(np.float64) * float(self.step.mean())
+
     def inside(self, points: Float64[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
         """Return which points are inside."""
-        index = ((points - self.origin) / self.step).T
-        return ndimage.map_coordinates(self.field, index, order=1, cval=1.0) < 0
+        return self.depth(points) < 0
 
 
 def close_surface(model: CadModel, resolution: int = RESOLUTION) -> ClosedSurface:
     """Return a watertight surface of a model, whatever holes and loose sheets it has.
 
     The distance to the sheets is computed on a grid; what cannot be reached from outside without
-    coming within 3/4 of a voxel of a sheet is inside, and marching cubes (Lorensen and Cline
-    1987) draws the border. Bodies open only below, where they stand, or only behind, where they
-    hang, count as closed. The result is fitted to the model's box again, so only thin sheets
-    become thicker. Axes of less than 2 cm are stretched to 2 cm first.
+    coming within a voxel of a sheet is inside. The surface of what is inside is where its sheets
+    are; sheets that bound nothing become 1.5 voxels thick. Marching cubes (Lorensen and
+    Cline 1987) draws the border. Bodies open only below, where they stand, or only behind, where
+    they hang, count as closed. The result is fitted to the model's box again. Axes of less than
+    2 cm are stretched to 2 cm first.
 
     Args:
         model: To close.
@@ -66,14 +85,17 @@ def close_surface(model: CadModel, resolution: int = RESOLUTION) -> ClosedSurfac
     voxel = 1.0 / resolution
     counts = np.ceil(thick * resolution).astype(int) + 2 * _MARGIN + 1
     low = -(counts - 1) / 2 * voxel
-    near = _sheet_distance(corners, low, voxel, counts)
-    shell = near < _SHELL * voxel
+    corners = (corners - low) / voxel
+    points, face, far = _sheet_points(corners, _SPACING)
+    near = _splat(points, tuple(counts.tolist()))
+    shell = near < _SHELL
     reached = _reached(shell, None)
     floor = int(np.ceil((-thick[2] / 2 - low[2]) / voxel))
     reached &= _reached(shell, (2, floor))
     if model.placement == "wall":
         reached &= _reached(shell, (1, int(np.ceil((-thick[1] / 2 - low[1]) / voxel))))
-    field = np.where(reached | shell, near - _SHELL * voxel, -voxel).astype(np.float32)
+    field = _taut(near, np.where(reached | shell, near - _SHELL, -_FAR).astype(np.float32))
+    field = _with_loose_sheets(field, corners, points[far], face[far])
     vertices, faces, _, _ = marching_cubes(field, 0.0, gradient_direction="descent")
     outer = np.ptp(vertices, axis=0)
     fit = thick / (outer * voxel)
@@ -105,49 +127,115 @@ def _reached(
     return reached
 
 
-def _sheet_distance(
+def _taut(
+    near: Float32[np.ndarray, "nx ny nz"], wide: Float32[np.ndarray, "nx ny nz"]
+) -> Float32[np.ndarray, "nx ny nz"]:
+    """Return a field in voxels whose bodies end at their sheets; other sheets get a thin coat.
+
+    Args:
+        near: Distance to the sheets in voxels.
+        wide: Field in voxels that is negative in bodies and in a thick coat around all sheets.
+    """
+    from skimage.measure import marching_cubes  # noqa: PLC0415 (it takes a second)
+
+    outer = marching_cubes(wide, 0.0, gradient_direction="descent")[0]
+    away = _splat(outer.astype(np.float64), wide.shape)
+    exact = _SHELL + np.where(wide < 0, -away, away)
+    body = np.asarray(ndimage.maximum_filter(exact < -_BODY, 3)) & (exact < -_SKIN)
+    close = ndimage.maximum_filter(body, 3)
+    return np.where(close, exact, near - _COAT).astype(np.float32)
+
+
+def _with_loose_sheets(
+    field: Float32[np.ndarray, "nx ny nz"],
     corners: Float64[np.ndarray, "faces 3 3"],
-    low: Float64[np.ndarray, "3"],
-    voxel: float,
-    counts: Int64[np.ndarray, "3"],
-) -> Float64[np.ndarray, "nx ny nz"]:
-    """Return the distance of every node to the triangles; far from them a larger number."""
-    points = sheet_points(corners, 0.45 * voxel)
-    cells = np.clip(np.round((points - low) / voxel).astype(np.int64), 0, counts - 1)
-    occupied = np.zeros(counts, bool)
-    occupied[tuple(cells.T)] = True
-    band = ndimage.binary_dilation(occupied, np.ones((3, 3, 3), bool), iterations=2)
-    distance = np.full(tuple(counts), 3.0 * voxel)
-    nodes = np.argwhere(band)
-    tree = KDTree(points, balanced_tree=False, compact_nodes=False)
-    found = tree.query(nodes * voxel + low, distance_upper_bound=3.0 * voxel)[0]
-    distance[tuple(nodes.T)] = np.minimum(np.asarray(found), 3.0 * voxel)
-    return distance
+    points: Float64[np.ndarray, "n 3"],
+    face: Int64[np.ndarray, " n"],
+) -> Float32[np.ndarray, "nx ny nz"]:
+    """Return a field that is negative on all sheets: those without a body behind get a coat.
+
+    Args:
+        field: In voxels.
+        corners: Of the triangles, in voxels.
+        points: On the triangles, not at their edges: edges of bodies have no body behind.
+        face: On which triangle each point lies.
+    """
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal *= _COAT / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    places, step = (
+        np.concatenate([points, corners.mean(axis=1)]),
+        np.concatenate([normal[face], normal]),
+    )
+    loose = np.ones(len(places), bool)
+    for side in (places + step, places - step):
+        loose &= ndimage.map_coordinates(field, side.T, order=1) > 0
+    field = np.minimum(field, _splat(places[loose], field.shape) - np.float32(_COAT))
+    return np.where(np.abs(field) < _LEAST, -np.float32(_LEAST), field)
 
 
-def sheet_points(
+def _splat(
+    points: Float64[np.ndarray, "n 3"], shape: tuple[int, ...]
+) -> Float32[np.ndarray, "nx ny nz"]:
+    """Return the distance of every node to the nearest point; 2 where it is more.
+
+    Args:
+        points: In voxels from the first node, at least a voxel from the border and two from the
+            last node.
+        shape: Of the grid.
+    """
+    cell = np.floor(points).astype(np.int64)
+    rest = (points - cell).astype(np.float32)
+    node = np.ravel_multi_index(tuple(cell.T), shape)
+    squared = np.full(int(np.prod(shape)), _FAR * _FAR, np.float32)
+    steps = (-1, 0, 1, 2)
+    dx, dy, dz = ([(rest[:, axis] - step) ** 2 for step in steps] for axis in range(3))
+    for i, x in enumerate(steps):
+        for j, y in enumerate(steps):
+            flat, beside = node + (x * shape[1] + y) * shape[2], dx[i] + dy[j]
+            for k, z in enumerate(steps):
+                np.minimum.at(squared, flat + z, beside + dz[k])
+    return np.sqrt(squared).reshape(shape)
+
+
+def _sheet_points(
     corners: Float64[np.ndarray, "faces 3 3"], spacing: float
-) -> Float64[np.ndarray, "points 3"]:
-    """Return points on triangles, on a regular pattern no wider than about ``spacing``.
+) -> tuple[
+    Float64[np.ndarray, "points 3"], Int64[np.ndarray, " points"], Bool[np.ndarray, " points"]
+]:
+    """Return points on triangles, in rows along their longest sides, and whose they are.
+
+    The last tells which are further than a voxel from the edges of wide triangles.
 
     Args:
         corners: Of the triangles.
-        spacing: Wanted distance of neighbours; larger when there would be too many points.
+        spacing: Of the rows and in them, at most; larger when there would be too many points.
     """
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    while True:
-        pieces = np.maximum(np.ceil(sides / spacing).astype(np.int64), 1)
-        if ((pieces + 1) * (pieces + 2) // 2).sum() <= _MAX_POINTS * 2:
-            break
+    face = np.arange(len(corners))
+    sides = np.roll(corners, -1, axis=1) - corners
+    first = np.linalg.norm(sides, axis=2).argmax(axis=1)
+    start, along = corners[face, first], sides[face, first]
+    lift = corners[face, (first + 2) % 3] - start
+    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    twice = np.linalg.norm(np.cross(along, lift), axis=1)
+    height = twice / length
+    while ((height / spacing + 2) * (length / spacing / 2 + 2)).sum() > _MAX_POINTS:
         spacing *= 1.15
-    found: list[np.ndarray] = []
-    for count in np.unique(pieces):
-        i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
-        use = i + j <= count
-        weights = np.stack([i[use], j[use], count - i[use] - j[use]], axis=1) / count
-        found.append(np.einsum("wk,fkx->fwx", weights, corners[pieces == count]).reshape(-1, 3))
-    points = np.concatenate(found)
-    cells = np.round(points / (0.5 * spacing)).astype(np.int64)
-    cells -= cells.min(axis=0)
-    key = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
-    return points[np.unique(key, return_index=True)[1]]
+    of_row, up = _numbered(np.ceil(height / spacing).astype(np.int64) + 1)
+    row, right = _numbered(np.ceil(length[of_row] * (1 - up) / spacing).astype(np.int64) + 1)
+    chosen, up = of_row[row], up[row]
+    right = right * (1 - up)
+    found = start[chosen] + up[:, None] * lift[chosen] + right[:, None] * along[chosen]
+    share = np.stack([up, right, 1 - up - right], axis=1)
+    third = np.linalg.norm(sides, axis=2)[face[:, None], (first[:, None] + [0, 2, 1]) % 3]
+    inner = (share * (twice[:, None] / np.maximum(third, 1e-12))[chosen]).min(axis=1)
+    radius = twice / np.maximum(third.sum(axis=1), 1e-12)
+    return found, chosen, inner > np.minimum(1.0, 0.9 * radius)[chosen]
+
+
+def _numbered(
+    counts: Int64[np.ndarray, " rows"],
+) -> tuple[Int64[np.ndarray, " all"], Float64[np.ndarray, " all"]]:
+    """Return which row each of so many points belongs to, and its share of the way along it."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(row)) - (np.cumsum(counts) - counts)[row]
+    return row, number / np.maximum(counts - 1, 1)[row]

@@ -22,6 +22,8 @@ from ._write import PANORAMAS, PARTIAL, file_hash, is_written
 _T = TypeVar("_T", bound=Format)
 INDEX, ATTRIBUTION = "dataset.json", "ATTRIBUTION"
 GENERATOR = "panoscene synth"
+HOMES_VERSION = 2
+"""Raised whenever the home of a seed changes, in what it holds or how it is drawn."""
 
 
 class HomeEntry(Format):
@@ -54,6 +56,8 @@ class DatasetIndex(Format):
     name: str
     generator: str
     recipe: Recipe
+    homes_version: int = 1
+    """Of the rules that furnish homes and draw them: a home of the same seed differs in others."""
     planned: int
     """Panoramas of the whole set."""
     homes: tuple[HomeEntry, ...]
@@ -102,6 +106,13 @@ def begin_dataset(
             raise DatasetError(
                 folder / INDEX, "found a set of another recipe, expected the same or a new folder"
             )
+        if index.homes_version != HOMES_VERSION:
+            raise DatasetError(
+                folder / INDEX,
+                f"found homes of version {index.homes_version}, expected {HOMES_VERSION}, as this "
+                "version of panoscene makes them: take a new folder, or render the rest with the "
+                "version that began it",
+            )
         if unseen_bases is not None and index.unseen_bases != unseen:
             raise DatasetError(
                 folder / INDEX,
@@ -118,6 +129,7 @@ def begin_dataset(
         name=recipe.name,
         generator=f"{GENERATOR} {__version__}",
         recipe=recipe,
+        homes_version=HOMES_VERSION,
         planned=sum(len(job.cameras) for job in jobs),
         homes=tuple(HomeEntry(home=job.home, seed=job.seed, split=job.split) for job in jobs),
         unseen_bases=unseen,

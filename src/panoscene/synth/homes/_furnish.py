@@ -7,7 +7,7 @@ import numpy as np
 
 from ._fixtures import door_piece, heaters, window_piece
 from ._groups_sleeping import double_bed, wardrobe
-from ._hangings import ceiling_lamps, curtains, sockets, switches
+from ._hangings import bare_walls, ceiling_lamps, curtains, sockets, switches
 from ._library import ModelLibrary
 from ._manhattan import area_of
 from ._recipes import FIRST, HOBBIES, MORE, Group
@@ -130,6 +130,7 @@ def _furnish_room(space: Space, home: Home) -> None:
         heaters(space)
     ceiling_lamps(space)
     curtains(space)
+    bare_walls(space)
     sockets(space)
 
 

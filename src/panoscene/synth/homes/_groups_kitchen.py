@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ._library import is_kitchen_sink
 from ._putting import above, along, at_wall, near, on_top
 from ._space import Piece, Space
 from ._stock import Item
@@ -113,8 +114,9 @@ def _design(space: Space, height: float) -> Item | None:
     names = ["bottom_cabinet", "bottom_cabinet_no_top"]
     for name in names if space.rng.random() < 0.75 else names[::-1]:
         item = space.stock.take(
-            name, width=(0.42, 1.0), depth=(0.54, 0.66), height=(height - 0.012, height + 0.012)
-        )
+            name, width=(0.42, 1.0), depth=(0.54, 0.66), height=(height - 0.012, height + 0.012),
+            where=lambda model: model.support_height is not None,
+        )  # fmt: skip
         if item is not None and item.support is not None:
             return item
     return None
@@ -126,13 +128,13 @@ def _unit(space: Space, name: str, design: Item, most: float) -> Item | None:
     if name == "fridge":
         return _fridge(space, most)
     if name == "sink":
+        item = stock.take(
+            "sink", width=(0.55, min(1.25, most)), depth=(0.56, 0.66),
+            height=(height, height + 0.38), where=is_kitchen_sink,
+        )  # fmt: skip
+        if item is not None or any(map(is_kitchen_sink, stock.models("sink"))):
+            return item
         return stock.take(
-            "sink",
-            width=(0.5, min(1.25, most)),
-            depth=(0.5, 0.66),
-            height=(height, height + 0.38),
-            where=lambda model: model.placement == "floor" and model.size[1] > 0.55,
-        ) or stock.take(
             "sink", width=(0.45, min(1.2, most)), depth=(0.42, 0.66), height=(0.8, 1.25)
         )
     if name in _CABINETS:

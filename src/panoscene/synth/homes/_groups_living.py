@@ -189,7 +189,9 @@ def pictures_above(space: Space, lead: Piece) -> None:
         count = 2 if spare < 2.2 * item.size[0] or space.rng.random() < 0.5 else 3
         step = item.size[0] + space.rng.uniform(0.08, 0.2)
         for k in range(count):
-            above(space, item, lead, low, shift=(k - (count - 1) / 2) * step)
+            if item is not None:
+                above(space, item, lead, low, shift=(k - (count - 1) / 2) * step)
+                item = space.stock.another(item)
     else:
         above(space, item, lead, low, shift=space.rng.uniform(-0.1, 0.1))
 

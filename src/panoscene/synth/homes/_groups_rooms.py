@@ -3,6 +3,7 @@
 import numpy as np
 
 from ._groups_living import pictures_above
+from ._library import is_kitchen_sink
 from ._putting import above, along, at_wall, beside, carpet, free_standing, on_top
 from ._space import Piece, Space
 from ._things import IN_BATHROOM, ON_CHEST, things_on
@@ -52,7 +53,10 @@ def _hangs(model: object) -> bool:
 def basin(space: Space) -> Piece | None:
     """Add a basin with a mirror above it and a towel beside it."""
     for widest in (1.3, 0.8, 0.65):
-        item = space.stock.take("sink", width=(0.4, widest), depth=(0.35, 0.66))
+        item = space.stock.take(
+            "sink", width=(0.4, widest), depth=(0.35, 0.66),
+            where=lambda model: not is_kitchen_sink(model),
+        )  # fmt: skip
         if item is None:
             continue
         # a hanging basin is hung so that its rim is at 0.85 m
@@ -222,7 +226,8 @@ def picture(space: Space) -> Piece | None:
     if first is not None and item.size[0] < 0.7 and space.maybe(0.35):
         step = item.size[0] + space.rng.uniform(0.06, 0.18)
         for k in range(1, int(space.rng.integers(2, 4))):
-            if along(space, item, first, k * step, bottom=bottom) is None:
+            other = space.stock.another(item)
+            if along(space, other, first, k * step, bottom=bottom) is None:
                 break
     return first
 

@@ -13,6 +13,9 @@ _HEADROOM = 2.02
 _ABOVE_TABLE = 0.72
 _APART = 1.3
 """Metres between lamps, at least."""
+_UNADORNED = ("bathroom", "laundry", "kitchen")
+_BARE = 2.0
+"""Metres of a wall with nothing on it that are too much."""
 _CURTAINLESS = ("bathroom", "laundry", "kitchen", "hall")
 
 
@@ -111,6 +114,32 @@ def _hang_curtain(space: Space, item: Item, opening: Opening, lows: list[float])
                 space, hung, opening.wall, middle, bottom=low, gap=0.01, small=True, kind=CURTAIN
             ):
                 return
+
+
+def bare_walls(space: Space) -> None:
+    """Hang pictures, a mirror or a clock where a wall is bare over more than two metres."""
+    rng = space.rng
+    if space.room.kind in _UNADORNED:
+        return
+    for wall in range(len(space.walls.length)):
+        for start, stop in space.bare_parts(wall):
+            if stop - start < _BARE or rng.random() > 0.55 + 0.4 * space.density:
+                continue
+            count = min(3, int((stop - start) / 1.9)) if rng.random() < 0.6 else 1
+            step = (stop - start) / (count + 1)
+            item: Item | None = None
+            for k in range(count):
+                if item is None or rng.random() < 0.4:
+                    item = space.stock.take("picture", width=(0.3, 1.3))
+                else:
+                    item = space.stock.another(item)
+                if item is None:
+                    break
+                bottom = min(
+                    1.58 - float(item.size[2]) / 2, space.ceiling - 0.15 - float(item.size[2])
+                )
+                place = start + (k + 1) * step + float(rng.uniform(-0.15, 0.15))
+                along_wall(space, item, wall, place, bottom=bottom, small=True)
 
 
 def switches(space: Space) -> None:

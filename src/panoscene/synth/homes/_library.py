@@ -1,7 +1,7 @@
 """What furnishing needs to know about furniture models, and stand-ins for development."""
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Protocol, runtime_checkable
@@ -9,6 +9,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from panoscene.scene import CATEGORIES
+
+from ._boards import Board
 
 
 @runtime_checkable
@@ -79,6 +81,8 @@ class SummaryLibrary:
     """A library of summaries, without shapes."""
 
     by_category: dict[str, tuple[ModelSummary, ...]] = field(default_factory=dict)
+    boards: Mapping[str, tuple[Board, ...]] = field(default_factory=dict)
+    """Of shelves, by id."""
 
     def models(self, category: str) -> Sequence[ModelSummary]:
         """Return the models of a category, "" for decoration."""
@@ -165,8 +169,33 @@ def kind_of(model: ModelSummary) -> str:
     return rest.partition("/")[0] if source == "parametric" else ""
 
 
-def summary_library(models: Iterable[ModelSummary]) -> SummaryLibrary:
+def is_kitchen_sink(model: ModelSummary) -> bool:
+    """Return whether a sink is a unit of a kitchen, as deep as the others, or a basin.
+
+    Examples:
+        >>> is_kitchen_sink(Summary("a", "sink", (1.2, 0.64, 1.05))), is_kitchen_sink(
+        ...     Summary("b", "sink", (0.56, 0.47, 0.97))
+        ... )
+        (True, False)
+    """
+    width, depth, height = model.size
+    return (
+        model.category == "sink"
+        and model.placement == "floor"
+        and width > 0.55
+        and 0.6 <= depth <= 0.66
+        and height > 0.84
+    )
+
+
+def summary_library(
+    models: Iterable[ModelSummary], boards: Mapping[str, tuple[Board, ...]] | None = None
+) -> SummaryLibrary:
     """Return a library of models given in any order, such as the entries of an asset cache.
+
+    Args:
+        models: The models.
+        boards: Of shelves, by id; things stand at one height in the others.
 
     Examples:
         >>> chair = Summary("chair/1", "chair", (0.5, 0.5, 0.9))
@@ -176,7 +205,9 @@ def summary_library(models: Iterable[ModelSummary]) -> SummaryLibrary:
     found: dict[str, list[ModelSummary]] = {}
     for model in sorted(models, key=lambda model: model.id):
         found.setdefault(model.category, []).append(model)
-    return SummaryLibrary({category: tuple(of) for category, of in found.items()})
+    return SummaryLibrary(
+        {category: tuple(of) for category, of in found.items()}, dict(boards or {})
+    )
 
 
 def stand_in_library(seed: int = 0, *, parametric: int = 8) -> SummaryLibrary:

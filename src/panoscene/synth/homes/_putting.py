@@ -1,12 +1,15 @@
 """Ways to put a piece in a room: at a wall, beside, in front of, above or on another one."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ._space import CARPET, SOLID, Piece, Space
 from ._stock import Item
 
 _TRIES = 32
+_SCREENS = ("monitor", "laptop", "standing_tv")
+_WATCHED = ("standing_tv",)
+"""Screens that do not stand before windows."""
 _BOARDS = ("shelf", "top_cabinet", "microwave")
 _BETWEEN_BOARDS = 0.27
 """Metres that are free above a board inside a piece."""
@@ -220,9 +223,64 @@ def on_top(
     bottom = lead.bottom + lead.item.support
     if item.size[2] > headroom(lead):
         return None
+    clear = ~_before_screen(space, item, lead, places)
+    if item.model.category in _WATCHED:
+        clear &= ~space.before_window(places, item.size, bottom)
+    places = places[clear]
+    tries = len(places)
     centre = np.hstack([places, np.full((tries, 1), bottom + item.size[2] / 2)])
     yaw = np.full(tries, _wrap(lead.yaw + turn))
     return space.put(item, centre, yaw, small=True, support=lead)
+
+
+def _before_screen(
+    space: Space, item: Item, lead: Piece, places: Float[np.ndarray, "k 2"]
+) -> Bool[np.ndarray, " k"]:
+    """Return at which places something would hide a screen, or be a hidden screen itself."""
+    hidden = np.zeros(len(places), bool)
+    right = np.array([np.cos(lead.yaw), np.sin(lead.yaw)])
+    front = np.array([-right[1], right[0]])
+    screen = item.model.category in _SCREENS
+    for other in space.pieces:
+        if other.support is not lead or other.top - other.bottom < 0.03:
+            continue
+        if not screen and other.category not in _SCREENS:
+            continue
+        away = places - other.centre[:2]
+        beside = np.abs(away @ right) < 0.9 * (item.size[0] + other.size[0]) / 2
+        ahead = away @ front
+        hidden |= beside & ((ahead < 0) if screen else (ahead > 0))
+    return hidden
+
+
+def on_board(space: Space, item: Item | None, lead: Piece, tries: int = 6) -> Piece | None:
+    """Return a piece put on one of the boards inside another one, or None."""
+    if item is None:
+        return None
+    able = [
+        board
+        for board in lead.item.boards
+        if board.headroom > item.size[2]
+        and board.right - board.left > item.size[0] + 0.02
+        and board.front - board.rear > item.size[1]
+    ]
+    for _ in range(tries if able else 0):
+        board = able[int(space.rng.integers(len(able)))]
+        spare = (board.right - board.left - item.size[0]) / 2 - 0.01
+        across = (board.left + board.right) / 2 + space.rng.uniform(-spare, spare)
+        deep = (board.front - board.rear - item.size[1]) / 2
+        place = lead.place(
+            float(across),
+            float((board.rear + board.front) / 2 + space.rng.uniform(-0.3, 0.6) * deep),
+        )
+        bottom = lead.bottom + board.height
+        placed = space.put(
+            item, np.array([[*place, bottom + item.size[2] / 2]]), np.array([lead.yaw]),
+            small=True, support=lead,
+        )  # fmt: skip
+        if placed is not None:
+            return placed
+    return None
 
 
 def headroom(lead: Piece) -> float:

@@ -212,6 +212,42 @@ class Space:
         hit = facing & (gaps > 0.0) & (along > 0.0) & (along < self.walls.length)
         return float(gaps[hit].min(initial=99.0))
 
+    def before_window(
+        self, places: Float[np.ndarray, "k 2"], size: Float[np.ndarray, " 3"], bottom: float
+    ) -> Bool[np.ndarray, " k"]:
+        """Return which places are less than 0.8 m before a window that a piece would cover."""
+        found = np.zeros(len(places), bool)
+        for opening in self.openings:
+            if opening.kind != "window" or bottom + size[2] < opening.bottom + 0.05:
+                continue
+            offset = places - self.walls.start[opening.wall]
+            along = offset @ self.walls.along[opening.wall]
+            middle = opening.start + opening.width / 2
+            beside = np.abs(along - middle) < (opening.width + size[0]) / 2
+            away = offset @ self.walls.normal[opening.wall]
+            found |= beside & (away > 0.0) & (away < 0.8)
+        return found
+
+    def bare_parts(self, wall: int) -> list[tuple[float, float]]:
+        """Return the parts of a wall, in metres along it, with nothing at the height of eyes."""
+        start, along = self.walls.start[wall], self.walls.along[wall]
+        normal, length = self.walls.normal[wall], float(self.walls.length[wall])
+        taken = [(o.start - 0.1, o.start + o.width + 0.1) for o in self.openings if o.wall == wall]
+        for piece in self.pieces:
+            away = float((piece.centre[:2] - start) @ normal)
+            turned = abs(np.sin(piece.yaw - self.walls.yaw[wall])) > 0.5
+            wide, deep = piece.size[[1, 0] if turned else [0, 1]]
+            if 0.0 < away < deep / 2 + 0.25 and piece.top > 1.15 and piece.bottom < 2.0:
+                middle = float((piece.centre[:2] - start) @ along)
+                taken.append((middle - wide / 2, middle + wide / 2))
+        free: list[tuple[float, float]] = []
+        at = 0.0
+        for low, high in sorted(taken):
+            if low > at:
+                free.append((at, low))
+            at = max(at, high)
+        return [*free, (at, length)] if at < length else free
+
     def on_wall(self, points: Float[np.ndarray, "k 2"]) -> int | None:
         """Return the wall on which all of some points lie; None if there is none."""
         offset = points[:, None] - self.walls.start

@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from panoscene.scene import CATEGORIES
 
-from ._library import ModelLibrary, ModelSummary, kind_of
+from ._boards import Board
+from ._library import ModelLibrary, ModelSummary, SummaryLibrary, kind_of
 
 Range = tuple[float, float]
 _ANY: Range = (0.0, 20.0)
@@ -50,6 +51,17 @@ class Item:
     model: ModelSummary
     size: Float[np.ndarray, " 3"]
     look: int
+    shape: tuple[Board, ...] = ()
+    """Boards of the model as it is."""
+
+    @property
+    def boards(self) -> tuple[Board, ...]:
+        """Where things can stand inside, in the frame of the piece."""
+        x, y, z = self.scale
+        return tuple(
+            Board(b.height * z, b.left * x, b.right * x, b.rear * y, b.front * y, b.headroom * z)
+            for b in self.shape
+        )
 
     @property
     def scale(self) -> tuple[float, float, float]:
@@ -74,6 +86,8 @@ class Stock:
         for model in library.models(""):
             self._decoration.setdefault(kind_of(model), []).append(model)
         self._sizes: dict[str, Float[np.ndarray, "models 3"]] = {}
+        self._boards = library.boards if isinstance(library, SummaryLibrary) else {}
+        self._hung: set[str] = set()
 
     def models(self, category: str) -> tuple[ModelSummary, ...]:
         """Return all models of a category or kind of decoration."""
@@ -114,6 +128,10 @@ class Stock:
             able = np.flatnonzero([where(model) for model in models])
         if able.size == 0:
             return None
+        if category == "picture":
+            able = np.array([k for k in able.tolist() if models[k].id not in self._hung], int)
+            if able.size == 0:
+                return None
         usual = USUAL.get(category, (_ANY, _ANY, _ANY))
         limits = np.array(
             [told or of for told, of in zip((width, depth, height), usual, strict=True)]
@@ -129,7 +147,26 @@ class Stock:
         if exact.size == 0:
             return None
         chosen = int(self.rng.choice(exact))
-        return Item(models[able[chosen]], fitted[chosen], self.sample_look())
+        return self._item(models[able[chosen]], fitted[chosen])
+
+    def another(self, item: Item) -> Item | None:
+        """Return a picture in the same frame that shows something else, or None.
+
+        Pictures of parametric frames depend on the look; the others have one.
+        """
+        if not _is_repainted(item.model):
+            return None
+        return Item(item.model, item.size, self._new_look())
+
+    def _item(self, model: ModelSummary, size: Float[np.ndarray, " 3"]) -> Item:
+        if model.category == "picture":
+            if not _is_repainted(model):
+                self._hung.add(model.id)
+            return Item(model, size, self._new_look())
+        return Item(model, size, self.sample_look(), self._boards.get(model.id, ()))
+
+    def _new_look(self) -> int:
+        return int(self.rng.integers(1, 2**31))
 
     def fitted(
         self,
@@ -151,3 +188,8 @@ class Stock:
     def sample_look(self) -> int:
         """Return the seed of a recolouring; 0, the model's own colours, in a third of all cases."""
         return 0 if self.rng.random() < 0.35 else int(self.rng.integers(1, 2**31))
+
+
+def _is_repainted(model: ModelSummary) -> bool:
+    """Return whether another look of a picture shows another motif."""
+    return model.id.startswith("parametric/")

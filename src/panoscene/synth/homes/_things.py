@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._putting import at_wall, free_standing, headroom, on_top
+from ._putting import at_wall, free_standing, headroom, on_board, on_top
 from ._space import Piece, Space
 
 ON_SHELF = ("books", "books", "books", "small_box", "vase", "plant", "speaker_system")
@@ -17,6 +17,7 @@ _LARGEST: dict[str, tuple[float, float, float]] = {
     "plant": (0.6, 0.5, 0.55), "basket": (0.45, 0.4, 0.4), "table_lamp": (0.45, 0.45, 0.65),
 }  # fmt: skip
 _ONCE = ("laptop", "table_lamp", "speaker_system", "loudspeaker", "coffee_machine", "basket")
+_MOST_IN_SHELF = 12
 _TURNED = ("laptop", "books", "dishes", "small_box", "candles", "vase", "bottles")
 
 
@@ -31,6 +32,9 @@ def things_on(space: Space, lead: Piece, most: float, *names: str) -> None:
             have are passed over.
     """
     known = [name for name in names if space.stock.models(name)]
+    if lead.item.boards:
+        _fill_boards(space, lead, known)
+        return
     count = int(space.rng.poisson(most * 2.0 ** (2.0 * space.density - 1.0)))
     for _ in range(min(count, 5) if known else 0):
         name = known[int(space.rng.integers(len(known)))]
@@ -44,6 +48,22 @@ def things_on(space: Space, lead: Piece, most: float, *names: str) -> None:
         straight = name not in _TURNED or lead.category in ("shelf", "console_table")
         turn = 0.0 if straight else space.rng.uniform(-0.3, 0.3)
         on_top(space, item, lead, back=0.55, spread=0.6, turn=turn)
+
+
+def _fill_boards(space: Space, lead: Piece, names: list[str]) -> None:
+    """Put things on the boards of a shelf: one or two on most of them."""
+    boards = lead.item.boards
+    count = int(space.rng.poisson(1.2 * len(boards) * 2.0 ** (1.4 * space.density - 0.7)))
+    for _ in range(min(max(count, 2), _MOST_IN_SHELF) if names else 0):
+        name = names[int(space.rng.integers(len(names)))]
+        if name in _ONCE and any(p.support is lead and p.category == name for p in space.pieces):
+            continue
+        tallest = max(board.headroom for board in boards) - 0.01
+        deepest = max(board.front - board.rear for board in boards)
+        item = space.stock.take(
+            name, width=(0.05, 0.6), depth=(0.05, max(deepest, 0.06)), height=(0.01, tallest)
+        )
+        on_board(space, item, lead)
 
 
 def toys_on_floor(space: Space, lead: Piece | None = None) -> None:

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from panoscene.synth.homes import Home, ModelSummary, Placed
+from panoscene.synth.homes import Home, ModelSummary, Placed, is_kitchen_sink
 
 _MOST = 0.15
+_KEPT = ("", "picture")
+"""Pictures that hang side by side would become the same one."""
 
 
 def replace_models(
@@ -21,8 +23,9 @@ def replace_models(
     The new model is stretched into the box of the old one, each way by at most 15 %, so that it
     still stands on what the old one stood on and its back is still at the wall. What stood on the
     old one is lifted or lowered to the new height. Equal models of a group, such as the chairs of
-    a table, stay equal. What fills openings stays, and so does decoration. Settle the home
-    afterwards: what is inside of the box is new.
+    a table, stay equal. What fills openings stays, and so do decoration, pictures,
+    and shelves with things on their boards; kitchen sinks are replaced by kitchen sinks. Settle
+    the home afterwards: what is inside of the box is new.
 
     Source: the random replacement of CAD models in Sec. 3.5 of the paper.
 
@@ -49,9 +52,10 @@ def replace_models(
     carriers = {piece.support for piece in placed}
     for members in _groups(home.placed):
         category = models[placed[members[0]].model].category
-        if category == "" or placed[members[0]].opening is not None or rng.random() >= share:
-            continue
         carries = any(index in carriers for index in members)
+        kept = category in _KEPT or (category == "shelf" and carries)
+        if kept or placed[members[0]].opening is not None or rng.random() >= share:
+            continue
         pieces = [placed[index] for index in members]
         fitting = [name for name in choices[category] if _fits(models, name, pieces, carries)]
         if not fitting:
@@ -79,6 +83,7 @@ def _fits(
 ) -> bool:
     new, old = models[name], models[pieces[0].model]
     same = name == pieces[0].model or new.placement != old.placement
+    same = same or is_kitchen_sink(new) != is_kitchen_sink(old)
     if same or (new.has_front and not old.has_front) or (carries and new.support_height is None):
         return False
     scales = np.array([_scale(models, piece, name) for piece in pieces])

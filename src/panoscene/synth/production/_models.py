@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from panoscene.synth.assets import CadModel, ModelEntry, add_models, load_library
-from panoscene.synth.homes import SummaryLibrary, summary_library
+from panoscene.synth.homes import SummaryLibrary, boards_of, has_top, summary_library
 from panoscene.synth.models import PARAMETRIC_KINDS, make_model
 
 from ._split import Part, entries_for
@@ -72,11 +72,22 @@ class Models:
 
     def entries_of(self, part: Part) -> dict[str, ModelEntry]:
         """Return the models that homes of a part are furnished with, by id."""
-        return entries_for(self.entries.values(), part)
+        found = entries_for(self.entries.values(), part)
+        return {name: entry for name, entry in found.items() if not self._is_open(entry)}
+
+    def _is_open(self, entry: ModelEntry) -> bool:
+        """Return whether one sees into a cupboard from above: its worktop is a model of its own."""
+        if entry.category != "bottom_cabinet_no_top" or entry.support_height is None:
+            return False
+        model = self._library[entry.id]
+        return not has_top(model.vertices, model.faces, entry.support_height)
 
     def summaries(self, part: Part) -> SummaryLibrary:
         """Return what furnishing needs to know of the models of a part."""
-        return summary_library(self.entries_of(part).values())
+        entries = self.entries_of(part)
+        shelves = (self._library[name] for name, e in entries.items() if e.category == "shelf")
+        boards = {model.id: boards_of(model.vertices, model.faces) for model in shelves}
+        return summary_library(entries.values(), boards)
 
 
 def add_parametric_models(cache: Path | str, designs: int = DESIGNS) -> int:

@@ -1,0 +1,3 @@
+from panoscene.pipeline import load as load
+
+__version__: str

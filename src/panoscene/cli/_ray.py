@@ -1,0 +1,80 @@
+"""Work that is spread over the computers of a Ray cluster."""
+
+import logging
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any, TypeVar
+
+_AGAIN = 3
+"""Times that a task is tried again when its computer goes away."""
+_Task = TypeVar("_Task")
+
+
+@contextmanager
+def ray_cluster(address: str | None) -> Iterator[ModuleType]:
+    """Give the package, connected to a cluster.
+
+    Args:
+        address: such as ``auto`` or ``ray://head:10001``; None takes the one that is running here,
+            or else the cores of this computer.
+
+    Raises:
+        ModuleNotFoundError: The optional package ray is missing.
+        ConnectionError: There is no cluster at the address.
+    """
+    # it reports how it is used to its makers unless told otherwise
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    try:
+        import ray  # noqa: PLC0415 - optional
+    except ModuleNotFoundError as error:
+        hint = "working on several computers needs ray: pip install 'panoscene[ray]'"
+        raise ModuleNotFoundError(hint, name="ray") from error
+    started = not ray.is_initialized()
+    if started:
+        try:
+            ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+        except ConnectionError as error:
+            raise ConnectionError(f"{address}: found no Ray cluster there") from error
+    try:
+        yield ray
+    finally:
+        if started:
+            ray.shutdown()
+
+
+def spread(
+    ray: ModuleType, work: Callable[..., Any], given: Sequence[Any], tasks: Sequence[_Task]
+) -> Iterator[tuple[_Task, Any]]:
+    """Return tasks as they finish, with what came of them: one core each.
+
+    Whatever goes wrong on another computer comes back as an exception of this one.
+
+    Args:
+        ray: the package, connected to a cluster.
+        work: a function of what is given and a task.
+        given: the same for all tasks.
+        tasks: what is to be done, each different.
+    """
+    remote: Any = ray.remote(work).options(
+        num_cpus=1, max_retries=_AGAIN, scheduling_strategy="SPREAD"
+    )
+    running = {remote.remote(*given, task): task for task in tasks}
+    try:
+        while running:
+            done, _ = ray.wait(list(running), num_returns=1)
+            task = running.pop(done[0])
+            yield task, _result(ray, done[0])
+    finally:
+        for reference in running:
+            ray.cancel(reference, force=True)
+
+
+def _result(ray: ModuleType, reference: Any) -> Any:
+    try:
+        return ray.get(reference)
+    except ray.exceptions.RayTaskError as error:
+        if error.cause is None:
+            raise
+        raise error.cause from None

@@ -1,0 +1,31 @@
+"""The rows of the table of results on rendered homes."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from panoscene.eval._export import ExportedMethod
+
+RENDERED = "rendered homes"
+"""What the targets' description begins with when they are panoramas of a rendered set."""
+ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
+    {
+        "full": ExportedMethod("ours", "the whole pipeline"),
+        "without-arrangement": ExportedMethod("ours", "the same without the arrangement"),
+        "pose-arranged": ExportedMethod(
+            "ours", "the pose network's boxes, arranged with relations that follow from them"
+        ),
+        "pose": ExportedMethod(
+            "input", "the pose network's boxes alone, relations that follow from them"
+        ),
+        "mean-box": ExportedMethod(
+            "baseline", "mean size where its height fills the BFoV, in a square room"
+        ),
+        "true-layout": ExportedMethod("oracle", "the whole pipeline in the true room"),
+        "true-detections": ExportedMethod("oracle", "the whole pipeline on the true BFoVs"),
+        "true-boxes": ExportedMethod("oracle", "the true boxes in the room that the pipeline sees"),
+        "true-relations": ExportedMethod(
+            "oracle", "the arrangement in the true room, with true BFoVs and relations"
+        ),
+    }
+)
+"""What ``export_reconstructions`` writes, by name."""

@@ -1,0 +1,105 @@
+"""Fewer triangles where a surface is flat: meshes that programs and people can work with."""
+
+from threading import Lock
+
+import fast_simplification
+import numpy as np
+import torch
+from jaxtyping import Float, Int, Int64
+
+from panoscene.scene import Mesh
+
+FACES_PER_CELL = 32
+"""Triangles that a mesh may have for each cell along an axis: 2,048 at resolution 64."""
+_BOLDNESS = 5.0
+"""Of the library, from 0 to 10: the lower, the longer it takes, and the more triangles are left."""
+_MOST_TOUCHING = 200
+"""Edges with more than two triangles that are mended."""
+_ONE_AT_A_TIME = Lock()
+"""The library keeps the mesh that it works on in one place."""
+
+Faces = Int64[np.ndarray, "_ 3"]
+Points = Float[np.ndarray, "_ 3"]
+
+
+def fewer_faces(mesh: Mesh, most: int) -> Mesh:
+    """Return a closed mesh with about that many triangles, in the same bounds.
+
+    Edges are collapsed where that changes the surface least (quadric error metrics: Garland and
+    Heckbert 1997). Where that makes two sheets touch in an edge, the edge gets a middle for each,
+    so that the surface stays closed, with two triangles at every edge.
+
+    Args:
+        mesh: closed.
+        most: triangles. A mesh that has no more is returned as it is.
+    """
+    if len(mesh.faces) <= most:
+        return mesh
+    before = mesh.vertices.double().numpy(force=True)
+    faces = mesh.faces.to(torch.int32).numpy(force=True)
+    with _ONE_AT_A_TIME:
+        found = fast_simplification.simplify(before, faces, target_count=most, agg=_BOLDNESS)
+    points, left = _fitted(np.asarray(found[0], np.float64), before), _unfolded(found[1])
+    points, left = _parted(points, left)
+    if len(left) == 0 or not is_closed(left):
+        return mesh
+    return Mesh(torch.from_numpy(points).to(mesh.vertices), torch.from_numpy(left).to(mesh.faces))
+
+
+def is_closed(faces: Int64[np.ndarray, "faces 3"]) -> bool:
+    """Return whether each edge has one triangle on either side, turned the same way round.
+
+    Examples:
+        >>> tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+        >>> is_closed(tetrahedron), is_closed(tetrahedron[:3])
+        (True, False)
+    """
+    start, end = _edges(faces)
+    count = int(faces.max(initial=-1)) + 1
+    there, back = np.sort(start * count + end), np.sort(end * count + start)
+    return bool((there[1:] != there[:-1]).all() and (there == back).all() and (start != end).all())
+
+
+def _edges(faces: Faces) -> tuple[Int64[np.ndarray, " edges"], Int64[np.ndarray, " edges"]]:
+    """Return where the edges of all triangles start and end, three for each."""
+    return faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+
+
+def _unfolded(faces: Int[np.ndarray, "n 3"]) -> Int64[np.ndarray, "m 3"]:
+    """Return triangles without those that lie on another one, back to back."""
+    faces = faces.astype(np.int64)
+    _, group, size = np.unique(
+        np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return faces[size[group.ravel()] != 2]
+
+
+def _parted(points: Points, faces: Faces) -> tuple[Points, Faces]:
+    """Return a surface in which no edge has more than two triangles: each pair gets its middle."""
+    for _ in range(_MOST_TOUCHING):
+        start, end = _edges(faces)
+        key = np.minimum(start, end) * len(points) + np.maximum(start, end)
+        edges, size = np.unique(key, return_counts=True)
+        touching = edges[size > 2]
+        if len(touching) == 0:
+            break
+        one, two = divmod(int(touching[0]), len(points))
+        there = np.flatnonzero((start == one) & (end == two)) // 3
+        back = np.flatnonzero((start == two) & (end == one)) // 3
+        if len(there) != len(back):
+            break
+        middle = np.tile(len(points) + np.arange(len(there)), 2)[:, None]
+        owner = np.concatenate([there, back])
+        halves = [np.where(faces[owner] == corner, middle, faces[owner]) for corner in (one, two)]
+        faces = np.concatenate([np.delete(faces, owner, axis=0), *halves])
+        centre = (points[one] + points[two]) / 2
+        points = np.concatenate([points, np.tile(centre, (len(there), 1))])
+    return points, faces
+
+
+def _fitted(points: Points, like: Float[np.ndarray, "others 3"]) -> Points:
+    """Return points moved and scaled along each axis to the bounds of others."""
+    low, high = like.min(axis=0), like.max(axis=0)
+    first, last = points.min(axis=0), points.max(axis=0)
+    share = (points - first) / np.maximum(last - first, 1e-12)
+    return (low + share * (high - low)).clip(low, high)

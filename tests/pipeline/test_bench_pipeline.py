@@ -1,0 +1,48 @@
+"""panoscene bench stages and pipeline: the figures that are promised."""
+
+import json
+
+import pytest
+
+from panoscene.cli import _measure_pipeline as measure
+from panoscene.cli import main
+from panoscene.pipeline import Stages
+
+from .conftest import Knowing
+
+STAGES = {"detector_s", "layout_s", "pose_s", "shape_64_s", "shape_128_s"}
+PARTS = {"upright_s", "detector_s", "layout_s", "pose_s", "arrangement_s", "shape_s"}
+
+
+@pytest.fixture(autouse=True)
+def quick(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> None:
+    def load_stages() -> Stages:
+        # whatever detections there are, the boxes are as many
+        return knowing.stages(pose=lambda image, found, layout, height: knowing.truth.objects)
+
+    monkeypatch.setattr(measure, "load_stages", load_stages)
+    monkeypatch.setattr(measure, "_command_seconds", lambda: 7.5)
+
+
+def test_stages(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "stages", "--repeats", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found) == STAGES | {"objects", "repeats", "machine"}
+    assert all(found[name] >= 0 for name in STAGES)
+
+
+def test_pipeline(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "pipeline", "--repeats", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    more = {"total_s", "cold_start_s", "peak_rss_mib", "objects", "repeats", "machine"}
+    assert set(found) == PARTS | more
+    assert found["total_s"] >= max(found[name] for name in PARTS)
+    assert found["cold_start_s"] == 7.5
+    assert 50 < found["peak_rss_mib"] < 64_000
+
+
+def test_people_get_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "pipeline", "--repeats", "1"]) == 0
+    assert "| cold start | 7.50 s |" in capsys.readouterr().out
+    assert main(["bench", "pipeline", "--repeats", "0"]) == 2
+    assert "--repeats: found 0" in capsys.readouterr().err
