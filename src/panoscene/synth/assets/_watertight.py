@@ -141,7 +141,7 @@ def _taut(
     outer = marching_cubes(wide, 0.0, gradient_direction="descent")[0]
     away = _splat(outer.astype(np.float64), wide.shape)
     exact = _SHELL + np.where(wide < 0, -away, away)
-    body = np.asarray(ndimage.maximum_filter(exact < -_BODY, 3)) & (exact < -_SKIN)
+    body = np.asarray(ndimage.maximum_filter(exact < -_BODY, 3), bool) & (exact < -_SKIN)
     close = ndimage.maximum_filter(body, 3)
     return np.where(close, exact, near - _COAT).astype(np.float32)
 

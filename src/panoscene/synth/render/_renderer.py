@@ -6,6 +6,7 @@ import numpy as np
 
 from panoscene.synth.render._camera import home_from_camera
 from panoscene.synth.render._develop import denoise, develop
+from panoscene.synth.render._even import even_light
 from panoscene.synth.render._labels import cast_labels
 from panoscene.synth.render._lamps import lamps_of
 from panoscene.synth.render._light_choice import light_choice, room_grid
@@ -84,6 +85,7 @@ class LitScene:
         cleaned = time.process_time()
         labels = cast_labels(self._tracer, camera)
         labelled = time.process_time()
+        radiance = even_light(radiance, labels.albedo, labels.normal)
         rgb = develop(radiance, labels.albedo, self._light)
         stages = np.diff([start, traced, cleaned, labelled, time.process_time()])
         for name, spent in zip(("paths", "denoiser", "labels", "develop"), stages, strict=True):
