@@ -128,7 +128,7 @@ def development_modules(root: Path) -> set[str]:
 def test_a_bare_install_imports_every_module(root: Path) -> None:
     absent = development_modules(root)
     assert {"hypothesis", "beartype", "playwright", "jsonschema", "py360convert"} <= absent
-    assert {"mitsuba", "drjit", "mujoco", "fast_simplification"} <= absent
+    assert {"mitsuba", "drjit", "mujoco"} <= absent
     assert {"lightning_fabric", "tensorboard", "pycocotools"} <= absent
     command = [sys.executable, "-W", "error", "-c", IMPORT_EVERYTHING, *sorted(absent)]
     result = subprocess.run(command, check=False, capture_output=True, text=True)

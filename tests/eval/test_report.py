@@ -182,7 +182,7 @@ def test_anybodys_page_says_nothing_of_our_rooms() -> None:
     assert "AP in percent of `net`." in part(page, "Categories")
     assert "| `sofa` | 2 | 50.0 | 50.0 | 50.0 | 50.0 |" in part(page, "Categories")
     ours = simulated("estimates")
-    assert "**There are no networks yet.**" in results_page([ours])
+    assert "`estimates` simulates what networks say" in results_page([ours])
     beside = rows[0].model_copy(update={"data": ours.data})
     page = results_page([ours, beside])
     assert "no networks yet" not in page

@@ -253,7 +253,7 @@ def _worse_than_its_input(scores: Sequence[ScoreFile]) -> str:
     return (
         "Why is `released` worse than its input? It takes the published weights and learning rate "
         "as they are, and keeps whatever comes out: with true relations they improve the boxes, "
-        "with wrong ones they do not ([docs/arrange.md](docs/arrange.md) has the experiment)."
+        "with wrong ones they do not ([arrange](arrange.md) has the experiment)."
     )
 
 

@@ -49,13 +49,14 @@ def test_anchors_stand_on_every_cell() -> None:
     network = ProposalNetwork(config)
     pyramid = [torch.zeros(1, 64, 64 // 2**k, 192 // 2**k) for k in range(4)]
     anchors = network.anchors(pyramid, Frame(256, 768, 768.0))
-    assert len(anchors) == 3 * sum(level[0, 0].numel() for level in pyramid)
-    size = (anchors[:3, 2:] - anchors[:3, :2]).tolist()
+    shapes = len(config.anchors[0])
+    assert len(anchors) == shapes * sum(level[0, 0].numel() for level in pyramid)
+    size = (anchors[:shapes, 2:] - anchors[:shapes, :2]).tolist()
     wanted = [list(shape) for shape in config.anchors[0]]
     assert all(
         abs(a - b) <= 1
         for x, y in zip(size, wanted, strict=True)
         for a, b in zip(x, y, strict=True)
     )
-    second = (anchors[3, :2] + anchors[3, 2:] - anchors[0, :2] - anchors[0, 2:]) / 2
+    second = (anchors[shapes, :2] + anchors[shapes, 2:] - anchors[0, :2] - anchors[0, 2:]) / 2
     assert second.tolist() == [4.0, 0.0]
