@@ -9,7 +9,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 import torch
@@ -95,3 +95,19 @@ def browser(missing: Callable[[str, str], NoReturn]) -> Iterator[Browser]:
         browser = playwright.chromium.launch(executable_path=path, args=BROWSER_FLAGS)
         yield browser
         browser.close()
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """Two nodes with one core each."""
+    ray = pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster  # noqa: PLC0415
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        small: dict[str, Any] = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
+        cluster = Cluster(True, head_node_args=small | {"include_dashboard": False})
+        cluster.add_node(**small)
+        yield cluster
+        ray.shutdown()
+        cluster.shutdown()

@@ -75,11 +75,13 @@ def run_reconstruct(
     if weights is not None and not weights.is_dir():
         raise InputError(f"--weights {weights}: found no folder there")
     check_folder(output)
+    version = open_dataset(data).info.homes_version
     items = [item for split in splits for item in open_dataset(data, split)]
     if not items:
         raise InputError(f"{data}: found no panoramas of {' and '.join(splits)}")
     pipeline = load(edition, weights=weights, shapes=False)
-    names = ("detector", "layout", "pose", "context")
+    # shapes are left out of the results, but the relation graph network is told of them
+    names = ("detector", "layout", "pose", "shape", "context")
     files = {
         name: shipped_weights(name) if weights is None else weights / f"{name}.safetensors"
         for name in names
@@ -89,7 +91,7 @@ def run_reconstruct(
             output,
             items,
             pipeline,
-            data=f"{RENDERED}, {' and '.join(splits)}",
+            data=f"{RENDERED} of version {version}, {' and '.join(splits)}",
             sources={name: sha256(file.read_bytes()).hexdigest() for name, file in files.items()},
             told=lambda done, total: progress(f"reconstructing: {done} of {total}"),
         )

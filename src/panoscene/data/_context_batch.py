@@ -14,7 +14,7 @@ from panoscene.models.shape import ShapeConfig, blob_centres
 from panoscene.scene import Layout, Relations
 
 from ._context_noise import OutputNoise
-from ._pose_samples import _padded, code_of
+from ._pose_samples import code_of, padded
 
 RELATIONS = tuple(field.name for field in fields(Relations))
 """Names of the relations."""
@@ -59,15 +59,15 @@ def collate_context(samples: Sequence[ContextSample]) -> dict[str, Tensor]:
     """
     n = max(1, *(len(sample.category) for sample in samples))
     m = max(len(sample.layout.floor_polygon) for sample in samples)
-    batch = {name: _padded([getattr(s, name) for s in samples], n) for name in _PLAIN}
-    batch |= {name: _padded([getattr(s.code, name) for s in samples], n) for name in _CODE}
+    batch = {name: padded([getattr(s, name) for s in samples], n) for name in _PLAIN}
+    batch |= {name: padded([getattr(s.code, name) for s in samples], n) for name in _CODE}
     for field in fields(OutputNoise):
         parts = [getattr(sample.noise, field.name) for sample in samples]
-        batch[f"noise_{field.name}"] = _padded(parts, n)
+        batch[f"noise_{field.name}"] = padded(parts, n)
     for name in RELATIONS:
         columns = n if name in AMONG_OBJECTS else m if name in WITH_WALLS else 0
         parts = [getattr(sample.relations, name) for sample in samples]
-        batch[name] = _padded_pairs(parts, n, columns) if columns else _padded(parts, n)
+        batch[name] = _padded_pairs(parts, n, columns) if columns else padded(parts, n)
     count = torch.tensor([len(sample.category) for sample in samples])
     batch["valid"] = torch.arange(n) < count.unsqueeze(-1)
     # nothing is divided by the extents of padding

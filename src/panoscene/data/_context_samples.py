@@ -18,9 +18,9 @@ from ._context_noise import OutputNoise, output_noise
 from ._context_records import EncodedObjects, EstimateRecord
 from ._draw import Draw
 from ._pose_samples import (
-    _random_turn,
-    _turned_bfov,
-    _turned_boxes,
+    random_turn,
+    turned_bfov,
+    turned_boxes,
 )
 
 _SOMEWHERE = (0.0, 2.0, 1.0)
@@ -131,7 +131,7 @@ def context_sample(
     change = augmentation or ContextAugmentation()
     draw = Draw(generator)
     source = sources[index]
-    turned_from_world = _random_turn(generator)
+    turned_from_world = random_turn(generator)
     mirrored = int(torch.linalg.det(turned_from_world) < 0)
     chosen = _kept(_view(source, change, draw), mirrored, change, draw)
     chosen = _turned(chosen, turned_from_world)
@@ -140,7 +140,7 @@ def context_sample(
         other = sources[(index + draw.whole(1, len(sources))) % len(sources)]
         chosen = _with(chosen, _strangers(_view(other, change, draw), strange, draw))
     layout = _random_layout(source, turned_from_world, change, draw)
-    truth = _turned_boxes(source.scene.objects.boxes, turned_from_world)
+    truth = turned_boxes(source.scene.objects.boxes, turned_from_world)
     seen = torch.rand(len(chosen.category), generator=generator) >= change.blind
     noise = output_noise(
         len(chosen.category), generator, delta=change.delta, distance=change.distance,
@@ -274,7 +274,7 @@ def _with(first: _Chosen, second: _Chosen) -> _Chosen:
 
 def _turned(chosen: _Chosen, matrix: Float[Tensor, "3 3"]) -> _Chosen:
     return _Chosen(
-        _turned_bfov(chosen.bfov, matrix),
+        turned_bfov(chosen.bfov, matrix),
         chosen.category,
         chosen.score,
         chosen.target,

@@ -130,14 +130,14 @@ def pose_sample(
         augmentation: How much is changed.
     """
     change = augmentation or PoseAugmentation()
-    turned_from_world = _random_turn(generator)
+    turned_from_world = random_turn(generator)
     picked = _picked(source, change, generator)
-    seen = _turned_bfov(picked.bfov, turned_from_world)
+    seen = turned_bfov(picked.bfov, turned_from_world)
     severity = float(torch.rand((), generator=generator)) * 1.5
     if picked.true:
-        seen = _jittered(seen, change, severity, generator)
+        seen = jittered_bfov(seen, change, severity, generator)
     objects = source.scene.objects
-    boxes = _turned_boxes(objects.boxes[picked.target.clamp(min=0)], turned_from_world)
+    boxes = turned_boxes(objects.boxes[picked.target.clamp(min=0)], turned_from_world)
     height = source.scene.panorama.camera_height
     layout = _random_layout(source.scene.layout, turned_from_world, change, generator)
     size = mean_size[picked.category]
@@ -202,9 +202,9 @@ def collate_pose(samples: Sequence[PoseSample]) -> dict[str, Tensor]:
     longest = max(len(sample.category) for sample in samples)
     batch = {"crops": torch.cat([sample.crops for sample in samples])}
     for name in ("bfov", "category", "clues", "matched"):
-        batch[name] = _padded([getattr(sample, name) for sample in samples], longest)
+        batch[name] = padded([getattr(sample, name) for sample in samples], longest)
     for name in _CODE:
-        batch[name] = _padded([getattr(sample.code, name) for sample in samples], longest)
+        batch[name] = padded([getattr(sample.code, name) for sample in samples], longest)
     count = torch.tensor([len(sample.category) for sample in samples])
     batch["valid"] = torch.arange(longest) < count.unsqueeze(-1)
     shown = torch.tensor([len(sample.crops) > 0 for sample in samples])
@@ -245,7 +245,7 @@ def _some(count: int, most: int, generator: torch.Generator) -> Int64[Tensor, " 
     return torch.randperm(count, generator=generator)[:most]
 
 
-def _random_turn(generator: torch.Generator) -> Float[Tensor, "3 3"]:
+def random_turn(generator: torch.Generator) -> Float[Tensor, "3 3"]:
     """Return a turn about the vertical, for half of all numbers with a mirror image."""
     angle, coin = torch.rand(2, generator=generator).tolist()
     turn = torch.tensor(angle * 2 * torch.pi)
@@ -259,7 +259,7 @@ def _random_tilt(deviation_deg: float, generator: torch.Generator) -> Float[Tens
     return torch.linalg.matrix_exp(torch.tensor([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]]))
 
 
-def _turned_bfov(bfov: Float[Tensor, "n 4"], matrix: Float[Tensor, "3 3"]) -> Float[Tensor, "n 4"]:
+def turned_bfov(bfov: Float[Tensor, "n 4"], matrix: Float[Tensor, "3 3"]) -> Float[Tensor, "n 4"]:
     """Return the BFoVs in a world that was turned, and mirrored before where det is -1."""
     flip = torch.linalg.det(matrix).round()
     turn = torch.atan2(matrix[0, 1], matrix[1, 1])
@@ -267,13 +267,13 @@ def _turned_bfov(bfov: Float[Tensor, "n 4"], matrix: Float[Tensor, "3 3"]) -> Fl
     return torch.cat([lon.unsqueeze(-1), bfov[:, 1:]], dim=-1)
 
 
-def _turned_boxes(boxes: OrientedBoxes, matrix: Float[Tensor, "3 3"]) -> OrientedBoxes:
+def turned_boxes(boxes: OrientedBoxes, matrix: Float[Tensor, "3 3"]) -> OrientedBoxes:
     flip = torch.linalg.det(matrix).round()
     turn = torch.atan2(matrix[0, 1], matrix[1, 1])
     return OrientedBoxes(boxes.centre @ matrix.T, boxes.size, wrap_angle(flip * boxes.yaw - turn))
 
 
-def _jittered(
+def jittered_bfov(
     bfov: Float[Tensor, "n 4"],
     change: PoseAugmentation,
     severity: float,
@@ -303,7 +303,7 @@ def _random_layout(
     return Layout(corners, layout.floor_height, layout.ceiling_height * float(stretch[2]))
 
 
-def _padded(parts: Sequence[Tensor], length: int) -> Tensor:
+def padded(parts: Sequence[Tensor], length: int) -> Tensor:
     whole = parts[0].new_zeros(len(parts), length, *parts[0].shape[1:])
     for k, part in enumerate(parts):
         whole[k, : len(part)] = part

@@ -178,9 +178,10 @@ def _introduction(scores: Sequence[ScoreFile]) -> list[str]:
         )
     elif rendered:
         parts.append(
-            "The photos are rendered. No home of the test parts was in the training; `test-unseen` "
-            "has furniture that was not there either. Every row but the oracles sees the photo and "
-            "the height of its camera alone."
+            "The photos are rendered; the first command makes them if its generator makes homes of "
+            "the same version (`homes_version` in dataset.json), others if not. No home of the "
+            "test parts was in the training; `test-unseen` has furniture that was not there "
+            "either. Every row but the oracles sees the photo and the height of its camera alone."
         )
     rows = [[f"`{score.method}`", score.kind, score.description] for score in scores]
     return [

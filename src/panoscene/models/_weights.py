@@ -127,6 +127,27 @@ def shipped_weights(stage: str) -> Path:
     return path
 
 
+def weights_file(stage: str, edition: Edition, weights: Path | None) -> Path:
+    """Return the file with the weights of a stage: the given one, or that of the package.
+
+    Args:
+        stage: Such as ``pose``.
+        edition: Which network; weights come with the compact one only.
+        weights: A .safetensors file; None for that of the package.
+
+    Raises:
+        CheckpointError: There is none in the package.
+    """
+    if weights is not None:
+        return weights
+    if edition != "compact":
+        raise CheckpointError(
+            f"{stage}-{edition}.safetensors", "no file named",
+            f"a file with weights: none come with the {edition} edition",
+        )  # fmt: skip
+    return shipped_weights(stage)
+
+
 def content_hash(tensors: Mapping[str, Tensor]) -> str:
     """Return the SHA-256 of names, types, shapes and values of tensors, whatever their order.
 

@@ -23,7 +23,7 @@ from panoscene.data import (
     seed_of,
     write_estimate_record,
 )
-from panoscene.data._pose_samples import _jittered as jittered_bfov
+from panoscene.data._pose_samples import jittered_bfov
 from panoscene.geometry import wrap_angle
 from panoscene.models.pose import PoseStage, pose_crops
 from panoscene.models.shape import ShapeStage, analytic_code

@@ -1,7 +1,7 @@
 """Rendering on a cluster: two nodes on this computer, with copies instead of pictures."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -20,22 +20,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::FutureWarning"),
 ]
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Any]:
-    """Two nodes with one core each."""
-    ray = pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster  # noqa: PLC0415
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-        small: dict[str, Any] = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
-        cluster = Cluster(True, head_node_args=small | {"include_dashboard": False})
-        cluster.add_node(**small)
-        yield cluster
-        ray.shutdown()
-        cluster.shutdown()
 
 
 def noting_nodes(render: Callable[[RenderTask], None]) -> Callable[[RenderTask], None]:

@@ -5,8 +5,7 @@ from pathlib import Path
 import torch
 
 from panoscene.models._editions import Edition
-from panoscene.models._errors import CheckpointError
-from panoscene.models._weights import read_weights, read_weights_header, shipped_weights
+from panoscene.models._weights import read_weights, read_weights_header, weights_file
 from panoscene.scene import Objects, Relations
 
 from ._config import CONFIGS, ContextConfig
@@ -72,12 +71,7 @@ def load_context_stage(
     Raises:
         CheckpointError: There are no weights, or they are for another network.
     """
-    if weights is None and edition != "compact":
-        raise CheckpointError(
-            f"{STAGE}-{edition}.safetensors", "no file named",
-            f"a file with weights: none come with the {edition} edition",
-        )  # fmt: skip
-    path = shipped_weights(STAGE) if weights is None else weights
+    path = weights_file(STAGE, edition, weights)
     stored = read_weights_header(path).config
     config = ContextConfig.model_validate(stored) if stored else CONFIGS[edition]
     network = build_context(config)

@@ -9,8 +9,7 @@ from torch.nn import functional
 
 from panoscene.geometry import OrientedBoxes, decode_box_code, perspective_crop
 from panoscene.models._editions import Edition
-from panoscene.models._errors import CheckpointError
-from panoscene.models._weights import read_weights, read_weights_header, shipped_weights
+from panoscene.models._weights import read_weights, read_weights_header, weights_file
 from panoscene.scene import CATEGORIES, Detections, Layout, Objects
 
 from ._clues import pose_clues
@@ -196,12 +195,7 @@ def load_pose_stage(
     Raises:
         CheckpointError: There are no weights, or they are for another network.
     """
-    if weights is None and edition != "compact":
-        raise CheckpointError(
-            f"{STAGE}-{edition}.safetensors", "no file named",
-            f"a file with weights: none come with the {edition} edition",
-        )  # fmt: skip
-    path = shipped_weights(STAGE) if weights is None else weights
+    path = weights_file(STAGE, edition, weights)
     stored = read_weights_header(path).config
     config = PoseConfig.model_validate(stored) if stored else CONFIGS[edition]
     network = build_pose(config)
