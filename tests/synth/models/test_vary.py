@@ -88,6 +88,12 @@ def test_plain_library_cloth_and_wood_get_textures() -> None:
     assert sofa.materials[0].name.startswith("fabric")
 
 
+def test_a_bed_of_wood_keeps_its_bedding_of_cloth() -> None:
+    frame, mattress = Material("flyellow", (0.67, 0.47, 0.33)), Material("bone2", (0.9, 0.83, 0.74))
+    bed = vary_model(_library_model("bed", (frame, mattress)), np.random.default_rng(0), 0.0, 64)
+    assert [m.name.split(" ")[0] for m in bed.materials] == ["wood", "fabric"]
+
+
 def test_retextured_parametric_models_keep_the_scale_of_their_cloth() -> None:
     model = make_model("cushion", 4, texture_size=16)
     for seed in range(6):

@@ -82,6 +82,27 @@ def test_an_interrupted_run_leaves_a_whole_index(
     assert (progress.done, progress.wanted) == (2, 8)
 
 
+def test_a_killed_run_is_listed_by_the_next_one(
+    tmp_path: Path, recipe: Recipe, cache: Path, copy_sample: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "set"
+    tasks, progress = begin_run(root, recipe, cache, limit=None, extra=None, threads=1)
+    copy_sample(tasks[0])  # and the process is gone
+    assert read_index(root).panoramas == ()
+
+    def listed() -> list[str]:
+        return sorted({entry.home for entry in read_index(root).panoramas})
+
+    def finishing() -> Iterator[tuple[RenderTask, str | None]]:
+        assert listed() == ["home0000"]
+        copy_sample(tasks[1])
+        yield tasks[1], None
+        assert listed() == ["home0000", "home0001"]
+
+    monkeypatch.setattr(run_module, "_LISTED_EVERY", 1)
+    follow(root, finishing(), progress, None)
+
+
 def test_another_recipe_or_no_models_are_refused(
     tmp_path: Path, recipe: Recipe, cache: Path
 ) -> None:

@@ -194,7 +194,10 @@ def _set_problems(dataset: SynthDataset) -> dict[str, list[str]]:
     listed = {entry.name for entry in entries}
     there = set(panorama_names(dataset.root))
     unlisted = sorted(there - listed)
-    found = [f"{name} is not in dataset.json; call finish_index" for name in unlisted]
+    found = [
+        f"{name} is not in dataset.json; the command that renders the set lists it"
+        for name in unlisted
+    ]
     parts: dict[str, set[str]] = {}
     for entry in entries:
         parts.setdefault(entry.home, set()).add(entry.split)

@@ -22,7 +22,7 @@ from ._write import PANORAMAS, PARTIAL, file_hash, is_written
 _T = TypeVar("_T", bound=Format)
 INDEX, ATTRIBUTION = "dataset.json", "ATTRIBUTION"
 GENERATOR = "panoscene synth"
-HOMES_VERSION = 2
+HOMES_VERSION = 3
 """Raised whenever the home of a seed changes, in what it holds or how it is drawn."""
 
 

@@ -63,7 +63,8 @@ def _alike(item: Item, size: tuple[float, float, float]) -> bool:
 
 
 def _is_rectangular(model: object) -> bool:
-    name = str(getattr(model, "id", "")).lower()
+    # models of the libraries have their names in ``source``
+    name = f"{getattr(model, 'id', '')} {getattr(model, 'source', '')}".lower()
     return not any(word in name for word in ("triangle", "round"))
 
 

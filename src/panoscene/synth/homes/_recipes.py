@@ -79,7 +79,7 @@ MORE: dict[RoomKind, dict[Group, float]] = {
     },
     "hall": {
         any_room.picture: 3.0, any_room.runner: 1.5, any_room.plant: 1.0, any_room.bench: 1.0,
-        any_room.coat_closet: 1.2, any_room.wall_mirror: 1.2, any_room.towels: 1.0,
+        any_room.coat_closet: 1.2, any_room.wall_mirror: 1.2,
         any_room.wall_clock: 0.6, live.large_clock: 0.6, any_room.basket: 0.6,
         any_room.floor_lamp: 0.4, live.bookcase: 0.6, any_room.stool: 0.3,
         any_room.trash_can: 0.3, any_room.entrance: 0.5,

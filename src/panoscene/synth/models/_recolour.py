@@ -31,6 +31,8 @@ _WOODEN = frozenset(
 _CLOTHED = frozenset(
     ("bed", "cushion", "sofa", "sofa_chair", "stool", "chair", "office_chair", "carpet")
 )
+_BEDDING = 0.75
+"""Lightness: what is so light in a bed is bedding, even if its colour is that of wood."""
 _KEPT_CATEGORIES = frozenset(("plant", "toilet", "bathtub", "sink", "laptop", "monitor"))
 _MACHINES = frozenset(
     ("washer", "dryer", "dishwasher", "fridge", "microwave", "oven", "stove", "cooktop",
@@ -68,6 +70,8 @@ def _family(material: Material, category: str, share: float) -> str:
     if named is not None:
         return named
     hue, light, saturation = colorsys.rgb_to_hls(*material.colour)
+    if category == "bed" and share > 0.2 and light > _BEDDING:
+        return "fabric"
     if share > 0.2 and category in _WOODEN and 0.03 < hue < 0.14 and saturation > 0.15:
         return "wood"
     if share > 0.2 and category in _CLOTHED and material.metallic < 0.3:

@@ -26,6 +26,8 @@ from ._models import Models
 from ._photographs import Extra, photograph_home
 
 Told = Callable[["RenderProgress"], None]
+_LISTED_EVERY = 10
+"""Homes after which dataset.json is brought up to date, in case the run is killed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +131,9 @@ def follow(
 ) -> RenderProgress:
     """Return how far the set is when all tasks are done; write its index whatever happens."""
     start, before = time.monotonic(), progress.done
+    finish_index(root)  # a run that was killed could not
     try:
-        for task, problem in finished:
+        for number, (task, problem) in enumerate(finished, start=1):
             made = 0 if problem else len(task.job.cameras)
             failed = ((task.job.home, problem),) if problem else ()
             done = progress.done + made
@@ -138,6 +141,8 @@ def follow(
                 done, progress.wanted, time.monotonic() - start, done - before,
                 progress.failed + failed,
             )  # fmt: skip
+            if number % _LISTED_EVERY == 0:
+                finish_index(root)
             if told is not None:
                 told(progress)
     finally:
