@@ -56,5 +56,6 @@ $(VENV)/.runtime-installed: pyproject.toml $(BIN)/python
 $(VENV)/.dev-installed: pyproject.toml $(BIN)/python
 	@echo "Installing panoscene and its test tools into $(VENV); the first time takes minutes ..."
 	@$(INSTALL) --upgrade 'pip>=25.1'
-	@$(INSTALL) -e '.[synth,ray,train]' --group dev
+	@# what is imported is compiled then, and kept; compiling all that is there takes a minute
+	@$(INSTALL) --no-compile -e '.[synth,ray,train]' --group dev
 	@touch $@ $(VENV)/.runtime-installed

@@ -1,4 +1,4 @@
-"""Writes the measured numbers of benchmarks/*.json into README.md and docs/.
+"""Writes the measured numbers of benchmarks/*.json into README.md, docs/ and a model card.
 
     panoscene bench arrange --json > benchmarks/arrange.json
     panoscene experiment arrange --json > benchmarks/experiment.json
@@ -8,6 +8,8 @@
     panoscene bench stages --json > benchmarks/stages.json
     panoscene bench pipeline --json > benchmarks/pipeline.json
     python benchmarks/upright.py FOLDER-OF-A-RENDERED-SET
+    python benchmarks/curves.py NAME=RUN_FOLDER ...
+    python benchmarks/shape_scores.py RECIPE WEIGHTS
     python benchmarks/tables.py
 
 With --check it writes nothing and exits 1 when a table is stale.
@@ -34,12 +36,21 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = (
     "README.md",
     "docs/arrange.md",
+    "docs/detector.md",
     "docs/eval.md",
     "docs/reconstruct.md",
     "docs/scene.md",
     "docs/synth.md",
+    "docs/train.md",
     "docs/upright.md",
+    "model_cards/shape-compact.md",
 )
+
+SHAPE_KINDS = {
+    "crops": "objects in validation panoramas",
+    "unseen": "pictures of unseen models",
+    "seen": "pictures of training models",
+}
 
 
 def tables() -> dict[str, str]:
@@ -64,6 +75,8 @@ def tables() -> dict[str, str]:
         + f"\n\nOn {scoring['processor']}, {scoring['cores']} cores.",
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
         **upright_text(),
+        **curves_text(),
+        **shape_text(),
         **synth_text(),
         **seconds_text("stages"),
         **seconds_text("pipeline"),
@@ -101,6 +114,82 @@ def seconds_text(name: str) -> dict[str, str]:
         f"{machine['processor']}, {machine['cores']} cores."
     )
     return {name: f"{seconds_table(measured)}\n\n{text}"}
+
+
+def curves_text() -> dict[str, str]:
+    """Return how scores rose in trainings; nothing before they were read."""
+    file = ROOT / "benchmarks" / "curves.json"
+    if not file.is_file():
+        return {}
+    runs = json.loads(file.read_text())
+    texts = {"curves": curves_table(runs)}
+    if "detector" in runs:
+        texts["curve-detector"] = detector_curve(runs["detector"])
+    return texts
+
+
+def curves_table(runs: dict[str, Any]) -> str:
+    """Return the score of each training's validations, what it is, and what was learned from."""
+    head = "| training | panoramas | samples a step | score after steps | score |"
+    lines = [head, "| --- | ---: | ---: | --- | --- |"]
+    for name, run in runs.items():
+        best = max(point["selection"] for point in run["points"])
+        scores = ", ".join(_point(point, point["selection"] == best) for point in run["points"])
+        first = ", from weights" if run["started"] else ""
+        lines.append(
+            f"| {name}{first} | {run['panoramas']} | {run['batch_size']} | {scores} |"
+            f" {run['selection']} |"
+        )
+    return "\n".join(lines)
+
+
+def _point(point: dict[str, Any], best: bool) -> str:
+    text = f"{point['step']}: {point['selection']:.3f}"
+    return f"**{text}**" if best else text
+
+
+def detector_curve(run: dict[str, Any]) -> str:
+    """Return the detector's scores after so many steps, in percent."""
+    lines = ["| steps | mask AP50 | box AP50 | BFoV recall | of any category |", "| --- " * 5 + "|"]
+    for point in run["points"]:
+        precision = " | ".join(f"{100 * point[name]:.1f}" for name in ("mask_ap50", "box_ap50"))
+        recall = " | ".join(f"{point[name]:.0%}" for name in ("bfov_recall", "bfov_recall_any"))
+        lines.append(f"| {point['step']} | {precision} | {recall} |".replace("%", ""))
+    return "\n".join(lines)
+
+
+def shape_text() -> dict[str, str]:
+    """Return how good predicted shapes are, over points, over meshes and by category."""
+    measured = json.loads((ROOT / "benchmarks" / "shape_scores.json").read_text())
+    metrics, scores = measured["metrics"], measured["scores"]
+    points = ["| kind | network | box |", "| --- | --- | --- |"]
+    for kind, words in SHAPE_KINDS.items():
+        points.append(
+            f"| {words} | {metrics[f'{kind}_iou']:.3f} | {metrics[f'{kind}_box_iou']:.3f} |"
+        )
+    meshes = ["| kind | objects | method | Chamfer | F-score | normals | IoU |", "| --- " * 7 + "|"]
+    for kind, found in scores.items():
+        for method, mean in found["mean"].items():
+            exact = " | ".join(
+                f"{mean[name]:.3f}" for name in ("f_score", "normal_consistency", "volume_iou")
+            )
+            meshes.append(
+                f"| {kind} | {found['objects']} | {method} | {mean['chamfer']:.2f} | {exact} |"
+            )
+    names = sorted({name for found in scores.values() for name in found["by_category"]})
+    rows = [f"| category | {' | '.join(scores)} |", "| --- " * (1 + len(scores)) + "|"]
+    for name in names:
+        cells = [_shape_cell(found["by_category"].get(name)) for found in scores.values()]
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    tables = {"points": points, "meshes": meshes, "categories": rows}
+    return {f"shape-{name}": "\n".join(lines) for name, lines in tables.items()}
+
+
+def _shape_cell(methods: dict[str, Any] | None) -> str:
+    if methods is None:
+        return ""
+    overlaps = " / ".join(f"{found['volume_iou']:.2f}" for found in methods.values())
+    return f"{overlaps} ({methods['network']['objects']})"
 
 
 def upright_text() -> dict[str, str]:

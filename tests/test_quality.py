@@ -28,7 +28,13 @@ def run_tool(command: list[str], folder: Path) -> None:
     assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
 
 
-@pytest.mark.parametrize("check", CHECKS)
+@pytest.mark.parametrize(
+    "check",
+    [
+        pytest.param(check, marks=[pytest.mark.slow] if check == "pyright" else [])
+        for check in CHECKS
+    ],
+)
 def test_check_passes(check: str, root: Path) -> None:
     run_tool(CHECKS[check], root)
 

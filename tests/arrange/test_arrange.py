@@ -28,7 +28,7 @@ from panoscene.scene import (
     relations_from_boxes,
     scene_from_boxes,
 )
-from panoscene.synth import sample_room
+from panoscene.synth import sample_nonsense, sample_room
 
 from .conftest import noisy_room
 
@@ -380,7 +380,62 @@ def test_settings_are_strict():
         ArrangementSettings.model_validate({"step": 3})
 
 
+@pytest.mark.slow
 def test_random_scenes_are_never_made_worse():
     """A sample of what ``panoscene experiment safety`` does with 10,000 scenes."""
     result = run_arrange_safety(scenes=60, seed=1)
     assert result["worse"] == 0, result["broken"]
+
+
+FORGIVING = PRESETS["default"].model_copy(update={"tolerance": 0.08})
+
+
+def test_what_is_forgiven_stays():
+    """Overlaps and corners outside by less than the tolerance are within the error of boxes."""
+    small = scene_of(
+        (0, 1, 0.5, 1, 1, 1, 0), (0.95, 1, 0.5, 1, 1, 1, 0), (-1.55, 1, 0.5, 1, 1, 1, 0)
+    )
+    still, moved = (arrange(small, way).certificate.after for way in (FORGIVING, "default"))
+    assert still.worst_penetration > 0.02
+    assert still.worst_out_of_room > 0.04
+    assert moved.worst_penetration < 0.01
+    assert moved.worst_out_of_room < 0.01
+    large = scene_of((0, 0, 0.5, 1, 1, 1, 0), (0.7, 0, 0.5, 1, 1, 1, 0))
+    result = arrange(large, FORGIVING)
+    assert result.certificate.after.colliding_pairs == 0
+    assert 0.04 < result.certificate.after.worst_penetration < 0.1
+
+
+def test_the_doubtful_object_gives_way():
+    scene = scene_of((0, 1.2, 0.5, 1, 1, 1, 0), (0.6, 1.2, 0.5, 1, 1, 1, 0))
+    sure = with_objects(scene, score=torch.tensor([1.0, 0.2]))
+    settings = PRESETS["default"].model_copy(update={"doubtful_yield": True, "firmness": 0.9})
+    result = arrange(sure, settings)
+    assert result.certificate.after.colliding_pairs == 0
+    first, second = (
+        (result.scene.objects.boxes.centre - sure.objects.boxes.centre).norm(dim=-1).tolist()
+    )
+    assert second > 3 * first
+
+
+def stuck_scene() -> Scene:
+    """A pair that can be parted, and a box too large for the room with another in it."""
+    return scene_of(
+        (-1, -1, 0.5, 0.8, 0.8, 1, 0),
+        (-0.5, -1, 0.5, 0.8, 0.8, 1, 0),
+        (1.9, 0, 1.2, 0.3, 6, 2.6, 0),
+        (1.7, 1.5, 1.2, 0.5, 0.9, 2.6, 0),
+    )
+
+
+def test_one_stuck_object_does_not_stop_the_others():
+    scenes = [stuck_scene(), *(noisy_room(seed)[1] for seed in range(3))]
+    scenes += [sample_nonsense(np.random.default_rng(seed), 12) for seed in range(20)]
+    by_object = PRESETS["default"].model_copy(update={"safe_by": "object"})
+    whole, parts = arrange_scenes(scenes), arrange_scenes(scenes, by_object)
+    for scene, result in zip(scenes, parts, strict=True):
+        promised(scene, result)
+    solved = [result.certificate.outcome for result in parts].count("solved in part")
+    assert solved > 1
+    pairs = [sum(r.certificate.after.colliding_pairs for r in rs) for rs in (whole, parts)]
+    assert pairs[1] < pairs[0]

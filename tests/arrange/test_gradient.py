@@ -17,6 +17,13 @@ VARIANTS = {
     "default with the paper's collision": PRESETS["default"].model_copy(
         update={"collision": "sum", "axis_weight": 1.0, "relative_yaw_target": "mean"}
     ),
+    "default that forgives": PRESETS["default"].model_copy(
+        update={
+            "tolerance": 0.08,
+            "doubtful_yield": True,
+            "firmness": 0.9,
+        }
+    ),
     "released with IoU": PRESETS["released"].model_copy(update={"projection": "iou"}),
 }
 

@@ -1,8 +1,10 @@
 """What the pipeline predicts for a rendered set: rows, resuming, and what is told to whom."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 import torch
@@ -11,7 +13,8 @@ from torch import Tensor
 
 from panoscene.cli import main
 from panoscene.eval import ROWS, export_reconstructions, match_objects
-from panoscene.eval._rendered import predicted_rows
+from panoscene.eval._rendered import SHAPED, predicted_rows
+from panoscene.exports import write_glb
 from panoscene.models.layout import LayoutPrediction
 from panoscene.pipeline import Pipeline, Stages
 from panoscene.scene import (
@@ -20,6 +23,9 @@ from panoscene.scene import (
     Objects,
     Relations,
     Scene,
+    Shapes,
+    box_mesh,
+    read_scene,
     relations_from_boxes,
     select_objects,
 )
@@ -117,3 +123,56 @@ def test_the_command_refuses_what_it_cannot_use(
     assert "found no folder" in capsys.readouterr().err
     assert main(["eval", "reconstruct", str(tmp_path), "-o", str(tmp_path / "run")]) == 2
     assert not (tmp_path / "run").exists()
+
+
+def test_meshes_of_the_set_reach_the_targets(
+    item: PanoramaItem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    truth = item.scene()
+    stages = NearlyKnowing(truth).pipeline().stages
+    folder = tmp_path / "set" / item.name
+    copytree(item.folder, folder)
+    item = replace(item, folder=folder)
+
+    def cubes(image: Image, objects: Objects, *, resolution: int = 64) -> Shapes:
+        return Shapes(mesh=tuple(box_mesh() for _ in range(len(objects.boxes))))
+
+    shown = replace(truth.objects, shapes=cubes(item.image(), truth.objects))
+    write_glb(replace(truth, objects=shown), folder / "scene.glb")
+
+    def loaded(*_: object, shapes: bool, **__: object) -> Pipeline:
+        return Pipeline(replace(stages, shape=cubes if shapes else None))
+
+    monkeypatch.setattr("panoscene.cli._eval.load", loaded)
+    monkeypatch.setattr("panoscene.cli._eval.open_dataset", _only(item))
+    run = [
+        "eval",
+        "reconstruct",
+        str(SAMPLES),
+        "-o",
+        str(tmp_path / "run"),
+        "--shapes",
+        "--split",
+        "val",
+    ]
+    assert main(run) == 0
+    target = read_scene(tmp_path / "run" / "targets" / f"{item.name}.json").objects
+    assert all(mesh is not None for mesh in target.shapes.mesh)
+    assert torch.equal(target.boxes.centre, truth.objects.boxes.centre)
+    for row in ROWS:
+        found = read_scene(
+            tmp_path / "run" / "predictions" / row / f"{item.name}.json"
+        ).objects.shapes
+        assert bool(found.mesh) == (row in {*SHAPED, "true-boxes"}), row
+    rows = ["--targets", str(tmp_path / "run" / "targets"), "-o", str(tmp_path / "scores")]
+    score = ["eval", "score", str(tmp_path / "run" / "predictions" / "full"), *rows, "--shapes"]
+    assert main([*score, "--replicates", "0", "--workers", "1"]) == 0
+    full = json.loads((tmp_path / "scores" / "full.json").read_text())["metrics"]
+    assert full["shape.targets"]["value"] == len(truth.objects.boxes)
+
+
+def _only(item: PanoramaItem) -> Callable[..., object]:
+    class One(list[PanoramaItem]):
+        info = open_dataset(SAMPLES).info
+
+    return lambda *_: One([item])

@@ -1,5 +1,6 @@
 """Pages of results: which rows and tables they have, and that they say what is missing."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -97,6 +98,41 @@ def test_the_report_of_one_method_with_any_name(tmp_path: Path) -> None:
     write(scores("net-30"), tmp_path / "net-30.json")
     assert main(["eval", "report", str(tmp_path), "-o", str(tmp_path / "page.md")]) == 0
     assert "`net-30`" in (tmp_path / "page.md").read_text()
+
+
+TIMINGS = {
+    "objects": 20,
+    "detector_s": 0.25,
+    "layout_s": 0.5,
+    "context_s": 0.125,
+    "shape_s": 1.0,
+    "total_s": 2.0,
+    "cold_start_s": 8.0,
+    "peak_rss_mib": 1234.5,
+    "machine": {"processor": "abacus", "cores": 2},
+}
+
+
+def test_seconds_stand_beside_the_papers(tmp_path: Path) -> None:
+    page = part(results_page([scores("a")], TIMINGS), "Time")
+    assert "| detector, layout, boxes and relations | 0.88 | 0.72 |" in page
+    assert "| shapes, as meshes | 1.00 | 5.92 |" in page
+    assert "| everything, weights loaded | 2.00 | 11.38 |" in page
+    assert "arrangement" not in page
+    assert "1234 MiB" in page
+    assert "abacus" in page
+    assert "## Time" not in results_page([scores("a")])
+    (tmp_path / "scores").mkdir()
+    write(scores("a"), tmp_path / "scores" / "a.json")
+    command = ["eval", "report", str(tmp_path / "scores"), "-o", str(tmp_path / "page.md")]
+    file = tmp_path / "seconds.json"
+    for text in ("{}", "[1]", "{"):
+        file.write_text(text)
+        assert main([*command, "--timings", str(file)]) == 2
+    assert not (tmp_path / "page.md").exists()
+    file.write_text(json.dumps(TIMINGS))
+    assert main([*command, "--timings", str(file)]) == 0
+    assert "## Time" in (tmp_path / "page.md").read_text()
 
 
 def test_meshes_have_tables_when_they_were_measured_and_a_sentence_when_not() -> None:

@@ -1,6 +1,7 @@
 """Backbones: shapes, strides, the seam, and weights from elsewhere."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -39,6 +40,34 @@ def test_networks_have_their_known_sizes(
         backbone = build_backbone(name)
     assert (backbone.channels, backbone.strides) == (channels, (4, 8, 16, 32))
     assert count(backbone) == parameters
+
+
+def test_the_lite_network_is_that_of_timm() -> None:
+    import timm  # noqa: PLC0415
+
+    levels = (0, 1, 2, 3, 4)
+    theirs = timm.create_model(LITE, pretrained=False, features_only=True, out_indices=levels)
+    config = timm.get_pretrained_cfg(LITE)
+    backbone = build_backbone(LITE, levels=levels)
+    ours: nn.Module = backbone.network
+    info: Any = theirs.feature_info
+    assert list(ours.state_dict()) == list(theirs.state_dict())
+    assert config is not None
+    assert backbone.mean.flatten().tolist() == list(config.mean)
+    assert backbone.deviation.flatten().tolist() == list(config.std)
+    assert (list(backbone.channels), list(backbone.strides)) == (info.channels(), info.reduction())
+    deviations = [
+        [float(p.detach().std()) for p in network.parameters() if p.dim() == 4]
+        for network in (ours, theirs)
+    ]
+    assert deviations[0] == pytest.approx(deviations[1], rel=0.2)
+    ours.load_state_dict(theirs.state_dict())
+    generator = torch.Generator().manual_seed(0)
+    for rows, columns in ((64, 64), (65, 97)):
+        image = torch.rand(2, 3, rows, columns, generator=generator)
+        with torch.inference_mode():
+            for one, other in zip(ours.eval()(image), theirs.eval()(image), strict=True):
+                torch.testing.assert_close(one, other)
 
 
 @pytest.mark.parametrize("name", ["resnet18", LITE])

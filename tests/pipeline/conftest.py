@@ -7,6 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from panoscene.geometry import corner_signal_from_layout
 from panoscene.models.layout import LayoutPrediction
 from panoscene.pipeline import Stages
 from panoscene.sample import sample_photo_path, sample_room_path
@@ -52,8 +53,8 @@ class Knowing:
 
     def layout(self, image: Image, *, camera_height: float | None = None) -> LayoutPrediction:
         self.asked.append("layout")
-        signal = torch.zeros(2, 1024), torch.zeros(1024)
-        return LayoutPrediction(self.truth.layout, False, *signal)
+        corner = corner_signal_from_layout(self.truth.layout.floor_polygon)
+        return LayoutPrediction(self.truth.layout, False, torch.zeros(2, 1024), corner)
 
     def pose(
         self, image: Image, detections: Detections, layout: Layout | None, camera_height: float

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 import torch
 from torch import Tensor
 
+from panoscene.models.layout import LayoutStage, load_layout_stage
 from panoscene.pipeline import Pipeline, SphereGaps, sphere_gaps
+from panoscene.pipeline._flags import scene_flags
 from panoscene.sample import sample_photo_path
-from panoscene.scene import Scene, read_panorama
+from panoscene.scene import Scene, read_panorama, select_objects
 
 from .conftest import Knowing
 
@@ -96,3 +99,49 @@ def test_flags_are_for_programs_and_people(truth: Scene, photo: Tensor) -> None:
     assert result.doubts == (flag.text,)
     assert "the photo does not show the whole sphere" in flag.text
     assert SphereGaps(0.0, 0.0, 0.0, 0.2).where == ""
+
+
+def meadow() -> Tensor:
+    """A plain sky over rough ground, as far as one can see."""
+    generator = torch.Generator().manual_seed(0)
+    rough = torch.rand(3, ROWS // 2, COLUMNS, generator=generator)
+    ground = torch.tensor([0.3, 0.45, 0.2])[:, None, None] * (0.6 + 0.4 * rough)
+    sky = torch.linspace(0.4, 0.9, ROWS // 2)[None, :, None].expand(3, -1, COLUMNS)
+    return torch.cat([sky, ground], 1)
+
+
+@pytest.fixture(scope="module")
+def reader() -> LayoutStage:
+    return load_layout_stage()
+
+
+@pytest.mark.parametrize(
+    "picture", [meadow, lambda: torch.full((3, ROWS, COLUMNS), 0.6)], ids=["meadow", "plain"]
+)
+def test_pictures_without_walls_are_no_rooms(
+    truth: Scene, reader: LayoutStage, picture: Callable[[], Tensor]
+) -> None:
+    read = reader(picture(), camera_height=1.6)
+    flags = scene_flags(read, replace(truth, layout=read.layout))
+    [flag] = [flag for flag in flags if flag.code == "not_indoors"]
+    assert set(flag.numbers) == {"wall_deg", "corner", "wall_score"}
+
+
+def test_rooms_are_rooms(truth: Scene, photo: Tensor, reader: LayoutStage) -> None:
+    read = reader(photo, camera_height=1.6)
+    flags = scene_flags(read, replace(truth, layout=read.layout))
+    assert "not_indoors" not in [flag.code for flag in flags]
+
+
+def test_weak_walls_count_more_where_nothing_was_found(truth: Scene) -> None:
+    layout = replace(truth.layout, wall_score=torch.full((len(truth.layout.floor_polygon),), 0.4))
+    room = replace(truth, layout=layout)
+    read = Knowing(room).layout(torch.zeros(3, 1, 2))
+    nothing = select_objects(room.objects, torch.zeros(0, dtype=torch.long))
+    assert scene_flags(read, room) == ()
+    empty = replace(room, objects=nothing, relations=None)
+    assert [flag.code for flag in scene_flags(read, empty)] == ["not_indoors", "nothing_found"]
+
+
+def test_a_given_room_is_not_doubted(truth: Scene) -> None:
+    assert scene_flags(None, truth) == ()

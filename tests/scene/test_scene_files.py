@@ -23,6 +23,7 @@ from panoscene.scene import (
     scene_to_json,
     write_scene,
 )
+from panoscene.scene._files import formatted
 from panoscene.scene._numbers import numbers_from_tensor
 
 MINIMAL = Path(__file__).with_name("minimal_scene.json").read_text()
@@ -96,6 +97,21 @@ def test_files_are_readable(bedroom: Scene, tmp_path: Path) -> None:
     assert '    "floor_polygon": [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]],\n' in text
     assert '      "box": {"centre": [0.0, 1.0, 0.3], "size": [1.6, 2.0, 0.6], "yaw": ' in text
     assert len(text.splitlines()) < 130
+
+
+def test_tables_have_a_line_for_each_row() -> None:
+    rows = [[float(k), 0.25, -1.5] for k in range(20)]
+    lines = formatted({"vertices": rows}).splitlines()
+    assert lines[2:5] == [f"    [{k}.0, 0.25, -1.5]," for k in range(3)]
+    assert json.loads("\n".join(lines)) == {"vertices": rows}
+    assert formatted(rows[:2]) == "[[0.0, 0.25, -1.5], [1.0, 0.25, -1.5]]"
+
+
+def test_brackets_in_texts_end_no_row() -> None:
+    rows = [["], [", "[" * 60], ['"], ["', "{}"], [], [{}, {"a": [1, 2]}]]
+    text = formatted(rows)
+    assert json.loads(text) == rows
+    assert text.splitlines()[1] == f'  ["], [", "{"[" * 60}"],'
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX file modes")

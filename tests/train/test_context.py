@@ -113,6 +113,11 @@ def task_for(folder: Path, step: str, **options: Any) -> ContextTask:
         return context_task(recipe_for(folder, step, options=options))
 
 
+def test_it_learns_from_so_many_panoramas(folder: Path) -> None:
+    assert context_task(recipe_for(folder, "relations", panoramas=2)).sample_count() == 2
+    assert context_task(recipe_for(folder, "relations", panoramas=1)).sample_count() == 1
+
+
 def batch_of(task: ContextTask) -> dict[str, Tensor]:
     return task.collate([task.sample(k, torch.Generator().manual_seed(k)) for k in range(2)])
 

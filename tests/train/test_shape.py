@@ -154,3 +154,23 @@ def test_a_recipe_without_data_is_refused(tmp_path: Path) -> None:
     )  # fmt: skip
     with pytest.raises(TrainError, match="data: found none"):
         shape_task(recipe)
+
+
+def test_crops_of_the_first_panoramas_have_a_file_of_their_own(
+    task: ShapeTask, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("panoscene.train._shape.CONFIGS", {"compact": TINY})
+    options = {"folder": str(task.options.folder), "assets": str(folder / "assets")}
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=1, learning_rate=1.0,
+        data=SAMPLES, panoramas=1, options=options | {"prepare": False},
+    )  # fmt: skip
+    with pytest.raises(TrainError, match=r"crops-train-1\.npz: found no such file"):
+        shape_task(recipe)
+    fewer = shape_task(recipe.model_copy(update={"options": options}))
+    assert isinstance(fewer, ShapeTask)
+    assert fewer.crops is not None
+    assert task.crops is not None
+    count = len(fewer.crops.image)
+    assert 0 < count < len(task.crops.image)
+    assert np.array_equal(fewer.crops.image, task.crops.image[:count])

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import pytest
 from PIL import Image
 
 from panoscene.sample import sample_room_path
@@ -10,6 +11,7 @@ from panoscene.scene import read_scene
 from panoscene.views import run_demo
 
 
+@pytest.mark.slow
 def test_the_demo_repairs_the_room_and_leaves_pictures(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "demo"
     result = run_demo(folder, seed=0)

@@ -10,8 +10,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.arrange._batch import ArrangementBatch, collate_scenes
-from panoscene.arrange._certificate import Certificate, Measures, measure
+from panoscene.arrange._certificate import SLACK, Certificate, Measures, find_faults, measure
 from panoscene.arrange._energy import energy_terms
+from panoscene.arrange._holding import hold_back
 from panoscene.arrange._kernel import Kernel, make_kernel
 from panoscene.arrange._problem import (
     Problem,
@@ -25,8 +26,6 @@ from panoscene.arrange._solver import descend, steps
 from panoscene.geometry import OrientedBoxes
 from panoscene.scene import Scene
 
-_SLACK = 1e-5
-"""Relative and absolute rounding error that does not count as worse."""
 _BLENDS = (0.5, 0.25, 0.1)
 """Parts of the way to the solution that are tried when the solution itself is not acceptable."""
 
@@ -213,7 +212,7 @@ def _like(boxes: OrientedBoxes, scene: Scene) -> OrientedBoxes:
 
 def _measure(variables: Tensor, problem: Problem) -> Measures:
     boxes = boxes_from_variables(variables, problem)
-    return measure(boxes, problem.batch, energy_terms(variables, problem))
+    return measure(find_faults(boxes, problem.batch), energy_terms(variables, problem))
 
 
 def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
@@ -228,7 +227,7 @@ def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
         torch.cat([given.yaw, decoded.yaw[count:]]),
     )
     energies = energy_terms(variables, together, boxes)
-    return measure(boxes, together.batch, energies).split(1 + len(states))
+    return measure(find_faults(boxes, together.batch), energies).split(1 + len(states))
 
 
 def _energies(states: list[Tensor], problem: Problem) -> tuple[Tensor, ...]:
@@ -263,13 +262,13 @@ def _choose(
     taken = solved.finite
     words = ["solved" if good else "diverged, input returned" for good in taken.tolist()]
     if problem.settings.safe:
-        taken = _acceptable(after, before) & solved.finite
+        taken = after.acceptable(before) & solved.finite
         words = ["solved" if good else "input returned" for good in taken.tolist()]
-        for label, candidate in _second_choices(start, solved.final, kept):
+        for label, candidate in _second_choices(problem, solved.final, kept, before):
             if bool(taken.all()):
                 break
             trial = _measure(candidate, problem)
-            take = _acceptable(trial, before) & ~taken
+            take = trial.acceptable(before) & ~taken
             best = torch.where(take[None, :, None], candidate, best)
             after = trial.where(take, after)
             words = [label if new else word for new, word in zip(take.tolist(), words, strict=True)]
@@ -279,10 +278,13 @@ def _choose(
 
 
 def _second_choices(
-    start: Tensor, final: Tensor, kept: dict[int, Tensor]
+    problem: Problem, final: Tensor, kept: dict[int, Tensor], before: Measures
 ) -> Iterator[tuple[str, Tensor]]:
     """Yield what else may be acceptable, best first."""
+    start = problem.start
     yield "solved", final
+    if problem.settings.safe_by == "object":
+        yield "solved in part", hold_back(final, problem, before)
     for step in sorted(kept, reverse=True):
         yield f"state after {step} steps", kept[step]
     for part in _BLENDS:
@@ -301,12 +303,6 @@ def _settle(variables: Tensor, problem: Problem) -> Tensor:
     return torch.where(near[None], settled, variables)
 
 
-def _acceptable(after: Measures, before: Measures) -> Tensor:
-    """Return for each scene whether nothing that must not grow has grown."""
-    new, old = after.columns(), before.columns()
-    return (new <= old + _SLACK * (1 + old.abs())).all(-1) & torch.isfinite(new).all(-1)
-
-
 def _words(outcome: str, converged: bool, start: float, end: float) -> str:
     """Return the outcome; a descent that ended too early, or uphill, does not count as solved.
 
@@ -314,7 +310,7 @@ def _words(outcome: str, converged: bool, start: float, end: float) -> str:
     """
     if outcome != "solved":
         return outcome
-    if end > start + _SLACK * (1 + abs(start)):
+    if end > start + SLACK * (1 + abs(start)):
         return "worse than the input"
     return outcome if converged else "improved, not converged"
 

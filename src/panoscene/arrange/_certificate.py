@@ -19,6 +19,8 @@ from panoscene.geometry import (
 
 COLLISION_TOLERANCE = 0.1
 """Metres of overlap that the paper's counts forgive."""
+SLACK = 1e-5
+"""Relative and absolute rounding error that does not count as worse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,16 +122,29 @@ class Measures:
             -1,
         )
 
+    def acceptable(self, before: "Measures") -> Bool[Tensor, " scenes"]:
+        """Return for each scene whether nothing that must not grow has grown."""
+        new, old = self.columns(), before.columns()
+        return (new <= old + SLACK * (1 + old.abs())).all(-1) & torch.isfinite(new).all(-1)
 
-def measure(
-    boxes: OrientedBoxes, batch: ArrangementBatch, energy: Float[Tensor, "scenes terms"]
-) -> Measures:
-    """Return the violations of boxes of batch shape (scenes, n)."""
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """What is wrong with the boxes of a batch, before it is summed up."""
+
+    overlap: Float[Tensor, "scenes n n"]
+    """Metres that two objects would have to move to separate."""
+    outside: Float[Tensor, "scenes n"]
+    """Metres of a box outside the room, for objects that belong in it."""
+    volume: Float[Tensor, "scenes n"]
+    """Cubic metres of a box outside the room."""
+
+
+def find_faults(boxes: OrientedBoxes, batch: ArrangementBatch) -> Faults:
+    """Return what is wrong with boxes of batch shape (scenes, n)."""
     first = OrientedBoxes(boxes.centre[:, :, None], boxes.size[:, :, None], boxes.yaw[:, :, None])
     other = OrientedBoxes(boxes.centre[:, None], boxes.size[:, None], boxes.yaw[:, None])
     overlap = torch.relu(separation_margins(first, other).amin(-1)) * batch.pair_valid
-    # the paper takes half the tolerance off each side of both boxes
-    pairs = (overlap > COLLISION_TOLERANCE).sum((-1, -2)) / 2
     valid = batch.valid.to(overlap.dtype)
     corner = box_footprint(boxes)
     aside = signed_distance_to_polygon(corner.flatten(1, 2), batch.polygon)
@@ -141,6 +156,14 @@ def measure(
     inside = (batch.inside_room >= 0.5).to(valid.dtype)
     fraction = box_in_room_fraction(boxes, batch.polygon, batch.floor_height, batch.ceiling_height)
     volume = box_volume(boxes) * (1 - fraction) * valid
+    return Faults(overlap, outside * inside, volume)
+
+
+def measure(faults: Faults, energy: Float[Tensor, "scenes terms"]) -> Measures:
+    """Return the violations of each scene."""
+    overlap = faults.overlap
+    # the paper takes half the tolerance off each side of both boxes
+    pairs = (overlap > COLLISION_TOLERANCE).sum((-1, -2)) / 2
 
     def worst(values: Tensor) -> Tensor:
         return torch.cat([values, values.new_zeros((len(values), 1))], -1).amax(-1)
@@ -150,6 +173,6 @@ def measure(
         pairs=pairs.to(overlap.dtype),
         worst_penetration=worst(overlap.flatten(1)),
         total_penetration=overlap.sum((-1, -2)) / 2,
-        worst_outside=worst(outside * inside),
-        outside_volume=volume.sum(-1),
+        worst_outside=worst(faults.outside),
+        outside_volume=faults.volume.sum(-1),
     )

@@ -42,11 +42,11 @@ def _collision_errors(boxes: OrientedBoxes, problem: Problem) -> dict[str, Tenso
     batch, settings, conf = problem.batch, problem.settings, problem.confidence
     pair = terms.object_collision(
         boxes,
-        clearance=settings.clearance,
+        clearance=problem.apart,
         axis_weight=settings.axis_weight,
         kind=settings.collision,
     )
-    wall = terms.wall_collision(boxes, batch.polygon, clearance=settings.clearance)
+    wall = terms.wall_collision(boxes, batch.polygon, clearance=2 * problem.off_walls)
     apart = settings.clearance
     floor = terms.floor_collision(boxes, batch.floor_height, clearance=apart)
     ceiling = terms.ceiling_collision(boxes, batch.ceiling_height, clearance=apart)
@@ -89,7 +89,7 @@ def _observation_errors(
     rectangle = terms.projected_rectangle(boxes, batch.bfov, batch.camera_height)
     image = terms.reprojection(rectangle, batch.bfov, kind=problem.settings.projection)
     return {
-        "direction": (error[:2] * conf.valid).movedim(0, 1),
+        "direction": (error[:2] * conf.direction).movedim(0, 1),
         "distance": error[2] * conf.distance,
         "yaw": error[3] * conf.yaw,
         "size": (error[4:] * conf.size).movedim(0, 1),

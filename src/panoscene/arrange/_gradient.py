@@ -124,7 +124,7 @@ def _wall_force(box: _Boxes, k: Kernel) -> Array:
     crossed = ((level < 0) != (level < k.wall_edge.imag)) & (offset.real < level * k.wall_slant)
     sign = xp.where(crossed.sum(-1) % 2 == 1, -k.one, k.one)
     distance = xp.sqrt(squared.reshape(-1)[nearest] + 1e-18)
-    error = xp.maximum(distance * sign + k.clearance / 2, k.zero)
+    error = xp.maximum(distance * sign + k.off_walls, k.zero)
     push = k.wall_gain * xp.minimum(error * k.wall_slope, k.one) * sign / distance
     return away.reshape(-1)[nearest] * push
 
@@ -249,11 +249,11 @@ def _collision_push(margin: Array, k: Kernel) -> Array:
     xp = k.xp
     least = k.least(margin)
     if k.depth:
-        error = xp.maximum(least + k.clearance, k.zero)
+        error = xp.maximum(least + k.apart, k.zero)
         push = k.collision_gain * xp.minimum(error * k.collision_slope, k.one)
         return (margin == least) * push
-    margin = margin + k.clearance
-    error = (margin * k.axis_weight).sum(0) * (least + k.clearance > 0)
+    margin = margin + k.apart
+    error = (margin * k.axis_weight).sum(0) * (least + k.apart > 0)
     push = k.collision_gain * xp.minimum(error * k.collision_slope, k.one)
     return push * k.axis_weight
 

@@ -44,10 +44,11 @@ class Kernel:
     """The imaginary unit, in the precision of the problem."""
     turning: float
     clearance: float
+    apart: float
+    off_walls: float
     depth: bool
     overlap: bool
     collision_slope: float
-    reprojection_slope: float
     origin: Any
     scale: Any
     start: Any
@@ -82,6 +83,7 @@ class Kernel:
     observation_gain: Any
     turn: Any
     edge_target: Any
+    reprojection_slope: Any
     reprojection_gain: Any
     to_right: Any
     to_front: Any
@@ -98,6 +100,8 @@ class Kernel:
     smallest: Any
     least_allowed: Any
     most_allowed: Any
+    pace: Any
+    """Part of a step that each object goes."""
 
     def numpy(self) -> "Kernel":
         """Return the same constants as numpy arrays that share the memory."""
@@ -182,7 +186,7 @@ def make_kernel(problem: Problem) -> Kernel:
     )
     floor, ceiling = floor * valid, ceiling * valid
     observation = torch.stack(
-        [valid, valid, conf.distance, conf.yaw, conf.size, conf.size, conf.size]
+        [conf.direction, conf.direction, conf.distance, conf.yaw, conf.size, conf.size, conf.size]
     )
     observation_scale = torch.stack(
         [
@@ -220,6 +224,8 @@ def make_kernel(problem: Problem) -> Kernel:
         wall_rows=torch.stack([walls.centre[..., 2], *wall_half, walls.yaw]),
         axis_weight=settings.axis_weight * one.new_tensor([1, 1, 1, 1, 2]).view(5, 1, 1, 1),
         clearance=settings.clearance,
+        apart=problem.apart,
+        off_walls=problem.off_walls,
         depth=settings.collision == "depth",
         collision_slope=1 / beta,
         collision_gain=torch.cat([2 * pair("object_collision", conf.object_pair), no_wall], -1),
@@ -249,13 +255,13 @@ def make_kernel(problem: Problem) -> Kernel:
         height_half=one.new_tensor([1, 1, -1, -1, -1, -1]).view(6, 1, 1),
         height_slope=height_weight / beta,
         height_gain=height_scale * height_weight,
-        observation_slope=observation / beta,
+        observation_slope=observation / problem.beta,
         observation_gain=observation_scale * observation,
         turn=torch.polar(torch.ones_like(lon), lon),
         pitch=torch.polar(torch.ones_like(lat), -lat),
         edge_target=torch.stack([wide, -wide, tall, -tall], -1) / 2,
         reprojection_gain=single("reprojection", conf.reprojection)[..., None],
-        reprojection_slope=1 / beta,
+        reprojection_slope=(conf.reprojection / problem.beta)[..., None],
         overlap=settings.projection == "iou",
         to_right=side_x[:4],
         to_front=side_y[:4] * imaginary,
@@ -273,4 +279,5 @@ def make_kernel(problem: Problem) -> Kernel:
         smallest=problem.smallest,
         least_allowed=torch.cat([-endless, bounds[0]]),
         most_allowed=torch.cat([endless, bounds[1]]),
+        pace=problem.pace,
     )

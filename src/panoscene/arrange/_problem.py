@@ -36,6 +36,7 @@ class Confidence:
     relative_yaw: Float[Tensor, "scenes n n"]
     relative_yaw_wall: Float[Tensor, "scenes n m"]
     valid: Float[Tensor, "scenes n"]
+    direction: Float[Tensor, "scenes n"]
     distance: Float[Tensor, "scenes n"]
     size: Float[Tensor, "scenes n"]
     yaw: Float[Tensor, "scenes n"]
@@ -72,6 +73,23 @@ class Problem:
     def beta(self) -> float:
         """Error in metres or radians below which errors are squared."""
         return max(self.settings.loss_beta, SMALLEST_BETA)
+
+    @property
+    def apart(self) -> float:
+        """Metres by which objects are held apart; negative where overlap is forgiven."""
+        return self.settings.clearance - self.settings.tolerance
+
+    @property
+    def pace(self) -> Float[Tensor, "scenes n"]:
+        """Part of a step that each object goes."""
+        score = self.batch.score
+        share = self.settings.firmness
+        return 1 - share * score
+
+    @property
+    def off_walls(self) -> float:
+        """Metres by which corners are held off walls; negative where they may stand out."""
+        return self.settings.clearance / 2 - self.settings.tolerance
 
 
 def make_problem(
@@ -185,10 +203,12 @@ def _confidence(batch: ArrangementBatch, settings: ArrangementSettings) -> Confi
     if settings.inside_room_on_touching:
         touching_wall = touching_wall * inside[..., None]
 
+    held = valid * batch.score if settings.doubtful_yield else valid
+
     def observation(score: Tensor) -> Tensor:
         if not settings.observation_confidence:
-            return valid
-        return _weight(score, at.observation, "confidence") * valid
+            return held
+        return _weight(score, at.observation, "confidence") * held
 
     narrow = (batch.bfov[..., 2:] < WIDEST_BFOV).all(-1).to(valid.dtype)
     symmetric = (batch.touching + batch.touching.transpose(-1, -2)) / 2
@@ -204,10 +224,11 @@ def _confidence(batch: ArrangementBatch, settings: ArrangementSettings) -> Confi
         relative_yaw=_weight(most[0], at.relative_yaw, label) * pair,
         relative_yaw_wall=_weight(most[1], at.relative_yaw, label) * wall_pair,
         valid=valid,
+        direction=held,
         distance=observation(batch.distance_score),
         size=observation(batch.score),
         yaw=observation(batch.yaw_score),
-        reprojection=valid * narrow,
+        reprojection=held * narrow,
     )
 
 

@@ -109,10 +109,16 @@ class ArrangementSettings(_Frozen):
     """Whether the contact with walls is weighted with inside_room too."""
     observation_confidence: bool = True
     """Whether distance, size and yaw are held by their confidence above the threshold."""
+    doubtful_yield: bool = False
+    """Whether the observation is held by the detection score too, so that of two objects that
+    cannot both be right the doubtful one gives way."""
     reduction: Literal["sum", "mean"] = "sum"
     """Sum of all entries of a term, or their mean (zeros included)."""
     loss_beta: NonNegative = 0.0
     """Errors below this are squared (Huber, 'SmoothL1'); 0 is the plain absolute error."""
+    firmness: float = Field(default=0.0, ge=0, lt=1)
+    """Part by which an object of detection score 1 moves more slowly than one of score 0, so that
+    of two in each other's way the doubtful one makes room."""
     collision: Literal["sum", "depth"] = "sum"
     """Object-object collision: overlap summed over the separating axes (paper), or the
     smallest one, which is how far the boxes must really move."""
@@ -129,6 +135,9 @@ class ArrangementSettings(_Frozen):
     clearance: NonNegative = 0.0
     """Metres: objects are held this far apart and half as far from walls, floor and ceiling, and
     contact relations are content with this gap, so that contact never ends in penetration."""
+    tolerance: NonNegative = 0.0
+    """Metres of overlap with other objects and of standing out of walls that are forgiven, as by
+    the paper's counts: what is that small is within the error of an estimate."""
     size_range: float = Field(default=math.inf, ge=1)
     """Largest factor by which an extent may grow or shrink; 1 holds sizes as they are."""
     solver: Literal["sgd", "adam"] = "adam"
@@ -139,6 +148,9 @@ class ArrangementSettings(_Frozen):
     """Factor on the gradient of the direction variable (the release: 1000)."""
     safe: bool = False
     """Keep the input rather than anything worse in energy, collisions or out-of-room volume."""
+    safe_by: Literal["scene", "object"] = "scene"
+    """What goes back towards the input where ``safe`` refuses the solution: all objects, or first
+    those alone that are in the way."""
 
     @staticmethod
     def preset(name: str) -> "ArrangementSettings":

@@ -53,7 +53,7 @@ def _sgd(x: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[Ar
         if direction != 1:
             gradient = xp.concatenate([gradient[:2] * direction, gradient[2:]])
         velocity = settings.momentum * velocity + gradient
-        x = x - settings.learning_rate * velocity
+        x = x - settings.learning_rate * kernel.pace * velocity
         x = xp.minimum(xp.maximum(x, kernel.least_allowed), kernel.most_allowed)
         yield x
 
@@ -71,6 +71,6 @@ def _adam(x: Array, kernel: Kernel, settings: ArrangementSettings) -> Iterator[A
         first = rate / (1 - settings.momentum ** (step + 1))
         scale = 1 / (1 - _SECOND_MOMENTUM ** (step + 1))
         # the tiny offset keeps the square root differentiable for variables that never moved
-        x = x - first * mean / (xp.sqrt(square * scale + 1e-12) + _DAMPING)
+        x = x - first * kernel.pace * mean / (xp.sqrt(square * scale + 1e-12) + _DAMPING)
         x = xp.minimum(xp.maximum(x, kernel.least_allowed), kernel.most_allowed)
         yield x

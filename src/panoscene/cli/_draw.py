@@ -71,11 +71,8 @@ def draw_pictures(
     yield "birds-eye.png"
     draw_overlay(scene, output / "overlay.png", image=image, reference=reference)
     yield "overlay.png"
-    rendering = render_panorama(scene, height=RENDER_HEIGHT)
-    write_image(rendering, output / "render.png")
+    rendering, view = draw_renderings(scene, output)
     yield "render.png"
-    view = render_view(scene, default_view(scene))
-    write_image(view, output / "view.png")
     yield "view.png"
     if sheet:
         row = SheetRow(scene.name or "Room", scene, image=image, rendering=rendering, view=view)
@@ -91,6 +88,17 @@ def draw_pictures(
         image_caption=caption,
     )
     yield "report.html"
+
+
+def draw_renderings(
+    scene: Scene, output: Path
+) -> tuple[Float[Tensor, "3 rows columns"], Float[Tensor, "3 height width"]]:
+    """Render a scene from its camera and from outside into a folder, and return both pictures."""
+    rendering = render_panorama(scene, height=RENDER_HEIGHT)
+    write_image(rendering, output / "render.png")
+    view = render_view(scene, default_view(scene))
+    write_image(view, output / "view.png")
+    return rendering, view
 
 
 def serve_file(

@@ -7,7 +7,13 @@ from hashlib import sha256
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import blaming, check_folder, scene_files, write_text
+from panoscene.cli._files import (
+    blaming,
+    check_folder,
+    read_json_object,
+    scene_files,
+    write_text,
+)
 from panoscene.cli._progress import progress_bar, progress_words
 from panoscene.cli._terminal import note, say, say_json
 from panoscene.eval import (
@@ -34,10 +40,11 @@ from panoscene.eval import (
     write_scores,
 )
 from panoscene.eval import replace_between as between
+from panoscene.exports import read_glb
 from panoscene.models import Edition, shipped_weights
 from panoscene.pipeline import load
-from panoscene.scene import Scene, read_scene
-from panoscene.synth.dataset import open_dataset
+from panoscene.scene import Scene, object_names, read_scene
+from panoscene.synth.dataset import PanoramaItem, open_dataset
 
 Job = tuple[Path, ExportedMethod, Path]
 """A folder of predictions, what is known of it, and the folder of its targets."""
@@ -69,7 +76,13 @@ def run_export(
 
 
 def run_reconstruct(
-    data: Path, output: Path, splits: Sequence[str], weights: Path | None, edition: Edition
+    data: Path,
+    output: Path,
+    splits: Sequence[str],
+    weights: Path | None,
+    edition: Edition,
+    *,
+    shapes: bool,
 ) -> int:
     """Write what the pipeline and its parts predict for a rendered set; return the exit code."""
     if weights is not None and not weights.is_dir():
@@ -79,24 +92,35 @@ def run_reconstruct(
     items = [item for split in splits for item in open_dataset(data, split)]
     if not items:
         raise InputError(f"{data}: found no panoramas of {' and '.join(splits)}")
-    pipeline = load(edition, weights=weights, shapes=False)
-    # shapes are left out of the results, but the relation graph network is told of them
+    pipeline = load(edition, weights=weights, shapes=shapes)
+    # the relation graph network is told of shapes in any case
     names = ("detector", "layout", "pose", "shape", "context")
     files = {
         name: shipped_weights(name) if weights is None else weights / f"{name}.safetensors"
         for name in names
     }
+    sources = {name: sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
     with progress_words() as progress, blaming("--output"):
         export_reconstructions(
             output,
             items,
             pipeline,
             data=f"{RENDERED} of version {version}, {' and '.join(splits)}",
-            sources={name: sha256(file.read_bytes()).hexdigest() for name, file in files.items()},
+            sources=sources | ({"meshes": "with"} if shapes else {}),
+            true_scene=_scene_with_meshes if shapes else PanoramaItem.scene,
             told=lambda done, total: progress(f"reconstructing: {done} of {total}"),
         )
     note(f"wrote {output}: {len(items)} targets and the predictions of {', '.join(ROWS)}")
     return 0
+
+
+def _scene_with_meshes(item: PanoramaItem) -> Scene:
+    """Return the true scene of a panorama with the meshes of its scene.glb."""
+    file = item.folder / "scene.glb"
+    scene, shown = item.scene(), read_glb(file)
+    if object_names(scene.objects) != object_names(shown.objects):
+        raise InputError(f"{file}: found other objects than in scene.json")
+    return replace(scene, objects=replace(scene.objects, shapes=shown.objects.shapes))
 
 
 def run_score(
@@ -152,14 +176,17 @@ def _warn(text: str) -> None:
     note(f"warning: {text}")
 
 
-def run_report(source: Path, output: Path, readme: Path | None, *, check: bool) -> int:
+def run_report(
+    source: Path, output: Path, readme: Path | None, timings: Path | None, *, check: bool
+) -> int:
     """Write or check the pages of results and return the exit code."""
     files = sorted(source.glob("*.json")) if source.is_dir() else [source]
     if not files:
         raise InputError(f"{source}: found no files of scores, expected those of eval score")
     scores = in_order([read_scores(file) for file in files])
-    with blaming(source):
-        texts = {output: results_page(scores)}
+    seconds = None if timings is None else read_json_object(timings, "timings")
+    with blaming(source if timings is None else f"{source} or {timings}"):
+        texts = {output: results_page(scores, seconds)}
         if readme is not None:
             short = f"{summary_table(scores)}\n\n{summary_note(scores)}"
             texts[readme] = between(readme.read_text(), "results", short)

@@ -62,6 +62,7 @@ def reconstruct(
     ] = ("test-seen", "test-unseen"),
     weights: OptionalFolder = None,
     edition: Literal["compact", "paper"] = "compact",
+    shapes: bool = False,
 ) -> int:
     """Write the true scenes of a rendered set and what the pipeline predicts from its photos.
 
@@ -80,10 +81,11 @@ def reconstruct(
         split: Parts of the set.
         weights: Folder with the networks' weights, instead of those that come with the package.
         edition: Of the networks.
+        shapes: Give objects meshes, those of the set and predicted ones, for eval score --shapes.
     """
     from panoscene.cli._eval import run_reconstruct
 
-    return run_reconstruct(data, output, split, weights, edition)
+    return run_reconstruct(data, output, split, weights, edition, shapes=shapes)
 
 
 def score(
@@ -133,6 +135,7 @@ def report(
     *,
     output: Output = Path("RESULTS.md"),
     readme: OptionalFile = None,
+    timings: OptionalFile = None,
     check: Flag = False,
 ) -> int:
     """Write the tables of the scores as a Markdown page.
@@ -147,8 +150,9 @@ def report(
         output: The page.
         readme: Also put a short table into this file, between <!-- results:begin --> and
             <!-- results:end -->.
+        timings: What panoscene bench pipeline --json printed, for a table of seconds.
         check: Write nothing; exit with code 2 if a page is not what the scores give.
     """
     from panoscene.cli._eval import run_report
 
-    return run_report(results, output, readme, check=check)
+    return run_report(results, output, readme, timings, check=check)

@@ -1,10 +1,12 @@
 """Files that commands read and write."""
 
 import errno
+import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from panoscene.cli._errors import InputError
 from panoscene.scene import (
@@ -49,6 +51,23 @@ def writing(path: Path) -> Iterator[None]:
         blocked = error.filename is not None and Path(error.filename) in path.parents
         where = f"{error.filename}: " if blocked else ""
         raise InputError(f"{path}: cannot be written: {where}{reason}") from None
+
+
+def read_json_object(file: Path, what: str) -> dict[str, Any]:
+    """Return the object in a JSON file; ``what`` says what is expected there."""
+    try:
+        document = json.loads(file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"{file}: cannot be read: {reason}") from None
+    except ValueError as error:
+        raise InputError(f"{file}: found text that is not JSON ({error}), expected JSON") from None
+    except RecursionError:
+        raise InputError(f"{file}: found JSON nested too deeply, expected {what}") from None
+    if not isinstance(document, dict):
+        kind = type(document).__name__
+        raise InputError(f"{file}: found a {kind}, expected a JSON object of {what}")
+    return document
 
 
 def write_text(path: Path, text: str) -> None:

@@ -106,6 +106,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: help was asked for (code 0), or the arguments make no sense (code 2).
     """
+    # threads of PyTorch that wait for work must not take it from the threads of this program
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     arguments = list(sys.argv[1:] if argv is None else argv)
     if isinstance(sys.stdout, io.TextIOWrapper):
         # a terminal that cannot show a character must not end the program

@@ -2,35 +2,27 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 from uuid import uuid4
 
-from panoscene.cli._draw import draw_pictures
+from panoscene.cli._account import SCENE, account
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder, write_bytes
+from panoscene.cli._files import check_folder
 from panoscene.cli._progress import progress_bar
 from panoscene.cli._ray import ray_cluster, spread
-from panoscene.cli._terminal import complain, json_text, note, say, say_json
-from panoscene.exports import write_floor_plan_svg, write_glb
-from panoscene.pipeline import Pipeline, Reconstruction
-from panoscene.scene import (
-    PanoramaError,
-    SceneFormatError,
-    read_panorama,
-    relocate_photo,
-    write_scene,
-)
+from panoscene.cli._terminal import complain, note, say, say_json
+from panoscene.pipeline import Pipeline, Reconstruction, load_steps
+from panoscene.scene import CATEGORIES, PanoramaError, SceneFormatError, read_panorama
 from panoscene.style import words
-from panoscene.views import describe_violations, write_report
 
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp"})
-SCENE = "scene.json"
-"""The file that is written last: where it is, everything is."""
-TEXTURE = 64.0
-"""Pixels for each metre of the painted room: those of the panorama at 2.5 m."""
+_RESULTS = "panoscene.cli._results"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +147,18 @@ def reconstruct_files(
     return 0 if all(entry["ok"] for entry in entries) else 2
 
 
+@contextmanager
+def _ahead(pipeline: Pipeline) -> Iterator[None]:
+    """Load in another thread what the first photo needs later than it is needed here."""
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        for step in (*load_steps(pipeline.stages), partial(import_module, _RESULTS)):
+            pool.submit(step)
+        try:
+            yield
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
 def _there(task: Task) -> dict[str, Any]:
     return {"photo": str(task.file), "ok": True, "output": str(task.folder), "new": False}
 
@@ -167,8 +171,9 @@ def _outcomes(
         return
     if ray is None:
         pipeline = make()
-        for task in tasks:
-            yield task, reconstruct_one(pipeline, task)
+        with _ahead(pipeline):
+            for task in tasks:
+                yield task, reconstruct_one(pipeline, task)
         return
     # other computers start in other folders
     shared = {
@@ -215,7 +220,10 @@ def reconstruct_one(pipeline: Pipeline, task: Task) -> Outcome:
         start = time.perf_counter()
         result = pipeline(image, panorama, name=file.stem, resolution=choice.resolution)
         seconds = time.perf_counter() - start
-        _write(result, file, folder)
+        # imported meanwhile in another thread: drawing takes a second to import
+        from panoscene.cli._results import write_results  # noqa: PLC0415
+
+        write_results(result, file, folder)
     except (PanoramaError, SceneFormatError, InputError) as error:
         return Outcome({"photo": str(file), "ok": False, "error": str(error)})
     except OSError as error:
@@ -228,51 +236,15 @@ def reconstruct_one(pipeline: Pipeline, task: Task) -> Outcome:
         "output": str(folder),
         "objects": len(result.scene.objects.boxes),
         "corners": len(result.scene.layout.floor_polygon),
-        **_account(result),
+        **account(result),
     }
     return Outcome(entry, tuple(_lines(result, folder, seconds)))
 
 
-def _account(result: Reconstruction) -> dict[str, Any]:
-    """Return how a result came about, for programs."""
-    return {
-        "flags": [flag.as_dict() for flag in result.flags],
-        "doubts": list(result.doubts),
-        "timings": result.timings,
-        "certificate": None if result.certificate is None else result.certificate.as_dict(),
-    }
-
-
-def _write(result: Reconstruction, file: Path, folder: Path) -> None:
-    """Write everything about a photo, the scene last; all is drawn before the first is written."""
-    scene = result.scene
-    with TemporaryDirectory(prefix="panoscene-") as name:
-        drafts = Path(name)
-        for _ in draw_pictures(
-            scene, drafts, image=result.image, reference=None, page=False, sheet=False
-        ):
-            pass
-        write_glb(scene, drafts / "scene.glb", image=result.image, texture_px_per_metre=TEXTURE)
-        write_floor_plan_svg(scene, drafts / "floorplan.svg")
-        write_report(
-            drafts / "report.html",
-            scene,
-            image=result.image,
-            before=result.initial,
-            certificate=result.certificate,
-            timings=result.timings,
-            title=scene.name,
-            notes=result.doubts,
-        )
-        account = {"schema": "panoscene/reconstruction", "version": 1, **_account(result)}
-        (drafts / "reconstruction.json").write_text(json_text(account) + "\n", encoding="utf-8")
-        write_scene(relocate_photo(scene, file.resolve(), folder.resolve() / SCENE), drafts / SCENE)
-        for draft in sorted(drafts.iterdir(), key=lambda path: (path.name == SCENE, path.name)):
-            write_bytes(folder / draft.name, draft.read_bytes())
-
-
 def _lines(result: Reconstruction, folder: Path, seconds: float) -> Iterator[str]:
     """Return what was found, in sentences."""
+    from panoscene.views import describe_violations  # noqa: PLC0415 (as above)
+
     scene = result.scene
     names = [_name(scene, k) for k in range(len(scene.objects.boxes))]
     counted = ", ".join(
@@ -290,6 +262,4 @@ def _lines(result: Reconstruction, folder: Path, seconds: float) -> Iterator[str
 
 
 def _name(scene: Any, index: int) -> str:
-    from panoscene.scene import CATEGORIES  # noqa: PLC0415
-
     return words(CATEGORIES[int(scene.objects.category[index])])

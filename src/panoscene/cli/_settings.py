@@ -1,7 +1,6 @@
 """Settings of the optimiser from a preset, a file and options."""
 
 import difflib
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from pydantic import ValidationError
 
 from panoscene.arrange import ArrangementSettings
 from panoscene.cli._errors import InputError
+from panoscene.cli._files import read_json_object
 
 
 def chosen_settings(preset: str, file: Path | None, steps: int | None) -> ArrangementSettings:
@@ -20,7 +20,10 @@ def chosen_settings(preset: str, file: Path | None, steps: int | None) -> Arrang
     """
     document: dict[str, Any] = ArrangementSettings.preset(preset).model_dump()
     if file is not None:
-        document = _merged({**document, "name": file.stem}, _document(file))
+        changes = read_json_object(file, "settings")
+        if not _is_finite(changes):
+            raise InputError(f"{file}: found NaN or an infinite number, expected finite numbers")
+        document = _merged({**document, "name": file.stem}, changes)
     if steps is not None:
         if steps < 0:
             raise InputError(f"--steps: found {steps}, expected 0 or more")
@@ -29,21 +32,6 @@ def chosen_settings(preset: str, file: Path | None, steps: int | None) -> Arrang
         return ArrangementSettings.model_validate(document)
     except ValidationError as error:
         raise InputError(f"{file}: {_explained(error, document)}") from None
-
-
-def _document(file: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(file.read_text(encoding="utf-8-sig"))
-    except ValueError as error:
-        raise InputError(f"{file}: found text that is not JSON ({error}), expected JSON") from None
-    except RecursionError:
-        raise InputError(f"{file}: found JSON nested too deeply, expected settings") from None
-    if not isinstance(document, dict):
-        kind = type(document).__name__
-        raise InputError(f"{file}: found a {kind}, expected a JSON object of settings")
-    if not _is_finite(document):
-        raise InputError(f"{file}: found NaN or an infinite number, expected finite numbers")
-    return document
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

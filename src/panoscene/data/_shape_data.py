@@ -18,9 +18,10 @@ MODELS = "models"
 """Folder of the models' files."""
 
 
-def crops_file(folder: Path, split: str) -> Path:
-    """Return where the crops of a part of a data set are kept."""
-    return folder / f"crops-{split}.npz"
+def crops_file(folder: Path, split: str, panoramas: int | None = None) -> Path:
+    """Return where the crops of a part of a data set, or of its first panoramas, are kept."""
+    first = "" if panoramas is None else f"-{panoramas}"
+    return folder / f"crops-{split}{first}.npz"
 
 
 def prepare_shape_data(
@@ -29,6 +30,7 @@ def prepare_shape_data(
     folder: Path,
     *,
     views: int = 6,
+    panoramas: int | None = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> tuple[tuple[str, str], ...]:
     """Return id and reason of the models that could not be sampled; what is there stays.
@@ -41,13 +43,14 @@ def prepare_shape_data(
         assets: Cache of its models, with scikit-image and fast-simplification installed.
         folder: To fill.
         views: Pictures of each model.
+        panoramas: Of the part ``train``, the first ones; None for all.
         progress: Told of everything that is done.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for split in ("train", "val"):
-        path = crops_file(folder, split)
+    for split, first in (("train", panoramas), ("val", None)):
+        path = crops_file(folder, split, first)
         if not path.is_file():
-            write_object_crops(path, cut_object_crops(open_dataset(data, split)))
+            write_object_crops(path, cut_object_crops(open_dataset(data, split)[:first]))
             progress(path.name)
     return prepare_shape_store(
         assets, folder / MODELS, shaped_models(assets), views=views, progress=progress

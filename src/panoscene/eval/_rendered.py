@@ -12,6 +12,9 @@ from panoscene.pipeline import Given, Pipeline
 from panoscene.scene import Detections, Panorama, Scene, write_atomically, write_scene
 from panoscene.synth.dataset import PanoramaItem
 
+SHAPED = ("full", "true-detections")
+"""Rows with the meshes that the pipeline makes, if it does; the true boxes have the true ones."""
+
 
 def export_reconstructions(
     output: Path,
@@ -20,6 +23,7 @@ def export_reconstructions(
     *,
     data: str,
     sources: Mapping[str, str],
+    true_scene: Callable[[PanoramaItem], Scene] = PanoramaItem.scene,
     told: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
     """Write the truth and what the pipeline and its parts predict; return how many were new.
@@ -30,9 +34,10 @@ def export_reconstructions(
     Args:
         output: Folder; it is made if it does not exist.
         items: Panoramas of a rendered set.
-        pipeline: With all its stages; shapes are left out.
+        pipeline: With all its stages; those of ``SHAPED`` get meshes if it makes shapes.
         data: What the panoramas are, for the reader of the scores.
         sources: What the pipeline consists of, such as the hashes of its weights.
+        true_scene: Reads the true scene of a panorama; one with meshes lets shapes be scored.
         told: Called with how many are done, and how many there are.
 
     Raises:
@@ -46,7 +51,7 @@ def export_reconstructions(
         target = output / TARGETS / f"{item.name}.json"
         if target.is_file():
             continue
-        truth = replace(item.scene(), name=item.name)
+        truth = replace(true_scene(item), name=item.name)
         for name, scene in predicted_rows(item, truth, pipeline).items():
             write_scene(scene, _made(output / PREDICTIONS / name) / f"{item.name}.json")
         # the truth comes last: where it is, everything is
@@ -77,11 +82,11 @@ def predicted_rows(item: PanoramaItem, truth: Scene, pipeline: Pipeline) -> dict
     """
     image = item.image()
     stages = replace(pipeline.stages, shape=None)
-    whole = Pipeline(stages, settings=pipeline.settings)
+    unshaped = Pipeline(stages, settings=pipeline.settings)
     alone = Pipeline(replace(stages, context=None), settings=None)
     repaired = Pipeline(replace(stages, context=None), settings=pipeline.settings)
     photo = Panorama(image.shape[-1], image.shape[-2], camera_height=truth.panorama.camera_height)
-    full = whole(image, photo, name=item.name)
+    full = pipeline(image, photo, name=item.name)
     objects = full.initial.objects
     seen = Detections(objects.bfov, objects.category, objects.score)
     room = full.initial.layout
@@ -101,14 +106,14 @@ def predicted_rows(item: PanoramaItem, truth: Scene, pipeline: Pipeline) -> dict
         "pose-arranged": repaired(image, photo, given=found, name=item.name).scene,
         "pose": pose,
         "mean-box": mean_box_scene(pose),
-        "true-layout": whole(
+        "true-layout": unshaped(
             image, photo, given=replace(in_true_frame, layout=truth.layout), name=item.name
         ).scene,
-        "true-detections": whole(
+        "true-detections": pipeline(
             image, photo, given=replace(in_true_frame, detections=true_seen), name=item.name
         ).scene,
         "true-boxes": alone(image, photo, given=told_boxes, name=item.name).scene,
-        "true-relations": whole(image, photo, given=told_all, name=item.name).scene,
+        "true-relations": unshaped(image, photo, given=told_all, name=item.name).scene,
     }
 
 

@@ -9,13 +9,15 @@ RENDERED = "rendered homes"
 """What the targets' description begins with when they are panoramas of a rendered set."""
 ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
     {
-        "full": ExportedMethod("ours", "the whole pipeline"),
-        "without-arrangement": ExportedMethod("ours", "the same without the arrangement"),
+        "full": ExportedMethod("ours", "the whole pipeline; the relations are those of its boxes"),
+        "without-arrangement": ExportedMethod(
+            "ours", "the same without the arrangement; the relations are what the network says"
+        ),
         "pose-arranged": ExportedMethod(
             "ours", "the pose network's boxes, arranged with relations that follow from them"
         ),
         "pose": ExportedMethod(
-            "input", "the pose network's boxes alone, relations that follow from them"
+            "input", "the pose network's boxes alone, relations by a geometric rule"
         ),
         "mean-box": ExportedMethod(
             "baseline", "mean size where its height fills the BFoV, in a square room"

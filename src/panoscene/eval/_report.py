@@ -1,7 +1,8 @@
 """From files of scores to pages in Markdown; nothing in them is typed by hand."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from panoscene.eval._paper_rows import (
     paper_57_note,
@@ -22,6 +23,7 @@ from panoscene.eval._report_facts import (
     truth_row,
     whole_rooms,
 )
+from panoscene.eval._report_seconds import seconds_part
 from panoscene.eval._report_tables import category_part, fov_part, layout_part
 from panoscene.eval._results import Measured, ScoreFile
 from panoscene.eval._score_tables import (
@@ -52,11 +54,16 @@ _FEW = 8
 """Names that a sentence can bear."""
 
 
-def results_page(scores: Sequence[ScoreFile]) -> str:
+def results_page(scores: Sequence[ScoreFile], timings: Mapping[str, Any] | None = None) -> str:
     """Return RESULTS.md for files of scores on the same targets.
 
+    Args:
+        scores: of all methods.
+        timings: what ``panoscene bench pipeline --json`` printed; None where it does not belong.
+
     Raises:
-        ValueError: there are none, or they are of different targets.
+        ValueError: there are none, they are of different targets, or the timings are something
+            else.
     """
     check_same_targets(scores)
     whole = whole_rooms(scores)
@@ -71,6 +78,7 @@ def results_page(scores: Sequence[ScoreFile]) -> str:
         f"last rows are the paper's, on photos. {paper_semantic_note()}".strip(),
         score_table(whole, SEMANTIC, beside=paper_semantic_rows(SEMANTIC)),
         *_meshes_part(whole),
+        *seconds_part(timings),
         *fov_part(scores),
         *category_part(whole),
         "## The paper's own numbers",
@@ -153,7 +161,9 @@ def _introduction(scores: Sequence[ScoreFile]) -> list[str]:
             "```text\npanoscene synth render configs/synth/full.yaml data --limit 400\n"
             "panoscene eval reconstruct data -o runs/test\n"
             "panoscene eval score runs/test -o results\n"
-            "panoscene eval report results -o RESULTS.md --readme README.md\n```"
+            "panoscene bench pipeline --json > pipeline.json\n"
+            "panoscene eval report results -o RESULTS.md --readme README.md --timings pipeline.json"
+            "\n```"
         )
     page = "the page `eval` of panoscene's docs"
     if ours:

@@ -11,7 +11,7 @@ from panoscene.exports._plan_dimensions import Dimension, plan_dimensions
 from panoscene.exports._plan_labels import LABEL_MM, Label, place_labels
 from panoscene.exports._plan_openings import Opening, find_openings
 from panoscene.geometry import box_footprint, polygon_turn
-from panoscene.scene import CATEGORIES, Scene, object_names, scene_to_json
+from panoscene.scene import CATEGORIES, Scene, Shapes, object_names, scene_to_json
 from panoscene.style import NO_FRONT, OVERHEAD, WALL_THICKNESS
 
 SCALES = (10, 20, 50, 100, 200, 500)
@@ -103,7 +103,8 @@ def floor_plan(scene: Scene) -> FloorPlan:
     Raises:
         SceneFormatError: the scene has numbers that are not finite or a room that is none.
     """
-    scene_to_json(replace(scene, relations=None))
+    bare = replace(scene.objects, shapes=Shapes())
+    scene_to_json(replace(scene, objects=bare, relations=None))
     turn = polygon_turn(scene.layout.floor_polygon)
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     corners = scene.layout.floor_polygon.double().numpy(force=True) @ rotation.T

@@ -7,9 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import trimesh
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.exports._axes import gltf_from_world
@@ -17,6 +15,7 @@ from panoscene.exports._colours import surface_colour
 from panoscene.exports._glb_container import pack_glb
 from panoscene.exports._gltf_builder import GltfBuilder
 from panoscene.exports._room_textures import halvings, jpeg, reproject, texture_plane
+from panoscene.exports._smooth_normals import smooth_normals
 from panoscene.scene import (
     CATEGORIES,
     Scene,
@@ -28,9 +27,6 @@ from panoscene.scene import (
     scene_to_json,
     write_atomically,
 )
-
-SHARP = math.radians(35)
-"""Meshes are drawn smooth, unless more than a twentieth of their edges turn by more than this."""
 
 
 def write_glb(
@@ -198,17 +194,3 @@ def _relations(scene: Scene) -> dict[str, list[dict[str, Any]]]:
                 edge["angle"] = round(-angle, 4)
             found[triple.object].append(edge)
     return found
-
-
-def smooth_normals(
-    vertices: Float[np.ndarray, "vertices 3"], faces: Int[np.ndarray, "faces 3"]
-) -> Float[np.ndarray, "vertices 3"] | None:
-    """Return unit normals of the vertices of a round shape; None for an edgy one."""
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    angles = mesh.face_adjacency_angles
-    if len(angles) == 0 or float((angles > SHARP).mean()) > 0.05:
-        return None
-    with np.errstate(all="ignore"):
-        normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
-        length = np.linalg.norm(normals, axis=-1)
-    return normals if bool((np.abs(length - 1) < 1e-3).all()) else None

@@ -42,6 +42,7 @@ from panoscene.geometry._layout import layout_iou_3d as layout_iou_3d
 from panoscene.geometry._layout import wall_boxes as wall_boxes
 from panoscene.geometry._layout import wall_distance as wall_distance
 from panoscene.geometry._layout import wall_normals as wall_normals
+from panoscene.geometry._mesh_edges import edge_neighbours as edge_neighbours
 from panoscene.geometry._oriented_boxes import OrientedBoxes as OrientedBoxes
 from panoscene.geometry._overlap import box_intersection_volume as box_intersection_volume
 from panoscene.geometry._overlap import box_iou as box_iou

@@ -10,12 +10,15 @@ from torch import Tensor, nn
 
 from ._circular import make_circular
 from ._imagenet import imagenet_weights
+from ._lite import LiteNetwork
 
 BackboneName = Literal["resnet18", "resnet34", "resnet50", "tf_efficientnet_lite0"]
+_HALF = (0.5, 0.5, 0.5)
+"""Mean and deviation of the pictures that EfficientNet-Lite0 was trained with."""
 
 
 class Backbone(nn.Module):
-    """A network of timm without its classifier: RGB in [0, 1] to feature maps.
+    """A network as timm has it, without its classifier: RGB in [0, 1] to feature maps.
 
     The mean and standard deviation that the network was trained with are applied inside.
 
@@ -74,19 +77,13 @@ def build_backbone(
         >>> backbone.channels, backbone.strides
         ((40, 320), (8, 32))
     """
-    import timm  # noqa: PLC0415 (it takes a second)
-
     if name not in get_args(BackboneName):
         expected = ", ".join(get_args(BackboneName))
         raise ValueError(f"name: found {name!r}, expected one of {expected}")
     if not levels or list(levels) != sorted(set(levels) & set(range(5))):
         raise ValueError(f"levels: found {levels}, expected rising numbers from 0 to 4")
-    network = timm.create_model(name, pretrained=False, features_only=True, out_indices=levels)
-    config = timm.get_pretrained_cfg(name)
-    if config is None:
-        raise ValueError(f"name: timm does not know how the pictures of {name} are normalised")
-    info: Any = network.feature_info
-    _cut(network, info.module_name()[-1])
+    backbone = _lite(levels) if name == "tf_efficientnet_lite0" else _of_timm(name, levels)
+    network = backbone.network
     if imagenet:
         file = imagenet if isinstance(imagenet, Path) else None
         wanted = network.state_dict()
@@ -94,6 +91,24 @@ def build_backbone(
         network.load_state_dict({key: given[key] for key in wanted if key in given}, strict=False)
     if circular:
         make_circular(network)
+    return backbone
+
+
+def _lite(levels: tuple[int, ...]) -> Backbone:
+    network = LiteNetwork(levels)
+    strides = [2 ** (level + 1) for level in levels]
+    return Backbone(network, network.channels, strides, _HALF, _HALF)
+
+
+def _of_timm(name: str, levels: tuple[int, ...]) -> Backbone:
+    import timm  # noqa: PLC0415 (with torchvision and TorchDynamo it takes seconds)
+
+    network = timm.create_model(name, pretrained=False, features_only=True, out_indices=levels)
+    config = timm.get_pretrained_cfg(name)
+    if config is None:
+        raise ValueError(f"name: timm does not know how the pictures of {name} are normalised")
+    info: Any = network.feature_info
+    _cut(network, info.module_name()[-1])
     return Backbone(network, info.channels(), info.reduction(), config.mean, config.std)
 
 

@@ -66,8 +66,8 @@ def make_circular(module: Module) -> Module:
 def pad_circular(input: Tensor, layer: nn.Conv2d, *, same: bool) -> tuple[Tensor, int]:
     """Return the input padded for a convolution, and the rows that are still to be padded."""
     if same:
-        top, bottom = _same(input.shape[-2], layer, 0)
-        left, right = _same(input.shape[-1], layer, 1)
+        top, bottom = same_padding(input.shape[-2], layer, 0)
+        left, right = same_padding(input.shape[-1], layer, 1)
         if top != bottom:
             input = F.pad(input, (0, 0, top, bottom))
             top = 0
@@ -75,6 +75,23 @@ def pad_circular(input: Tensor, layer: nn.Conv2d, *, same: bool) -> tuple[Tensor
         top, left = (int(amount) for amount in _numbers(layer))
         right = left
     return wrap_columns(input, left, right), top
+
+
+def same_padding(size: int, layer: nn.Conv2d, axis: int) -> tuple[int, int]:
+    """Return what TensorFlow's "same" adds before and behind, to keep ``ceil(size / stride)``.
+
+    Args:
+        size: Of the input along the axis.
+        layer: The convolution.
+        axis: 0 for rows, 1 for columns.
+
+    Examples:
+        >>> same_padding(224, nn.Conv2d(1, 1, 3, stride=2), 0)
+        (0, 1)
+    """
+    stride, kernel, dilation = layer.stride[axis], layer.kernel_size[axis], layer.dilation[axis]
+    total = max((-(-size // stride) - 1) * stride + (kernel - 1) * dilation + 1 - size, 0)
+    return total // 2, total - total // 2
 
 
 def wrap_columns(input: Tensor, left: int, right: int) -> Tensor:
@@ -94,7 +111,7 @@ def wrap_columns(input: Tensor, left: int, right: int) -> Tensor:
 
 
 def _convert_convolution(layer: nn.Conv2d) -> None:
-    if type(layer).__name__ == "Conv2dSame":  # timm's, for networks that come from TensorFlow
+    if type(layer).__name__ == "Conv2dSame":  # ours or timm's, for networks from TensorFlow
         same = True
     elif type(layer) is nn.Conv2d:
         same = False
@@ -121,9 +138,3 @@ def _numbers(layer: nn.Conv2d) -> tuple[int, int]:
 
 def _pair(amount: object) -> tuple[int, int]:
     return (amount[0], amount[1]) if isinstance(amount, tuple) else (int(amount), int(amount))  # pyright: ignore
-
-
-def _same(size: int, layer: nn.Conv2d, axis: int) -> tuple[int, int]:
-    stride, kernel, dilation = layer.stride[axis], layer.kernel_size[axis], layer.dilation[axis]
-    total = max((-(-size // stride) - 1) * stride + (kernel - 1) * dilation + 1 - size, 0)
-    return total // 2, total - total // 2

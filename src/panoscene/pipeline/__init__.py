@@ -2,6 +2,7 @@
 
 from ._load import load as load
 from ._load import load_stages as load_stages
+from ._load import load_steps as load_steps
 from ._pipeline import Pipeline as Pipeline
 from ._records import Flag as Flag
 from ._records import FlagCode as FlagCode

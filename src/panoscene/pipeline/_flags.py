@@ -2,16 +2,27 @@
 
 import math
 
+from panoscene.geometry import boundary_from_layout
 from panoscene.models.layout import LayoutPrediction
-from panoscene.scene import Layout, Scene
+from panoscene.scene import Scene
 
 from ._records import Flag
 from ._sphere import SphereGaps
 
 TOLD_TILT = math.radians(3.0)
 """Radians; from here on the user is told that the camera leant."""
-WEAK_WALL = 0.4
-"""Mean confidence of the walls below which a room may be none."""
+LEAST_WALL = math.radians(45.0)
+"""Mean angle from floor to ceiling below which there may be no walls but the horizon. Rendered
+rooms have 47 degrees and more, eight real ones 60; seas, streets and most meadows that were painted
+for comparison have at most 44."""
+LEAST_CORNER = 0.5
+"""Signal of the surest corner below which none was seen: 0.69 and more in rooms, at most 0.44 in
+noise, plain pictures and on the sea."""
+WEAK_WALL = 0.2
+"""Mean confidence of the walls below which a room may be none. Real rooms have 0.35 and more, but
+a meadow 0.6, so it says little."""
+WEAK_EMPTY_WALL = 0.45
+"""The same where nothing was found in the room either: clouds have 0.34 to 0.41."""
 
 
 def photo_flags(gaps: SphereGaps, tilt: float) -> tuple[Flag, ...]:
@@ -39,22 +50,38 @@ def photo_flags(gaps: SphereGaps, tilt: float) -> tuple[Flag, ...]:
     return tuple(flags)
 
 
-def scene_flags(read: LayoutPrediction | None, layout: Layout, scene: Scene) -> tuple[Flag, ...]:
+def scene_flags(read: LayoutPrediction | None, scene: Scene) -> tuple[Flag, ...]:
     """Return what is noteworthy about what was found in a photo.
 
     Args:
         read: the layout with the signals that it was read from; None when it was given.
-        layout: the room.
         scene: the result.
     """
     flags: list[Flag] = []
     if read is not None and read.ambiguous:
         text = "the room can be read in two ways, perhaps because of an open doorway"
         flags.append(Flag("ambiguous_layout", text))
-    certain = 1.0 if layout.wall_score is None else float(layout.wall_score.mean())
-    if certain < WEAK_WALL:
-        text = "the walls are uncertain: this may not be a room, or not an indoor photo"
-        flags.append(Flag("not_indoors", text, {"wall_score": certain}))
+    if read is not None:
+        flags.extend(_not_indoors(read, scene))
     if len(scene.objects.boxes) == 0:
         flags.append(Flag("nothing_found", "no object was found"))
     return tuple(flags)
+
+
+def _not_indoors(read: LayoutPrediction, scene: Scene) -> tuple[Flag, ...]:
+    """Return the flag for a picture that shows no walls, no corner, or none to be sure of."""
+    layout = read.layout
+    ceiling, floor = boundary_from_layout(
+        layout.floor_polygon,
+        layout.floor_height,
+        layout.ceiling_height,
+        scene.panorama.camera_height,
+    )
+    height, corner = float((ceiling - floor).mean()), float(read.corner.max())
+    certain = 1.0 if layout.wall_score is None else float(layout.wall_score.mean())
+    least = WEAK_WALL if len(scene.objects.boxes) else WEAK_EMPTY_WALL
+    if height >= LEAST_WALL and corner >= LEAST_CORNER and certain >= least:
+        return ()
+    text = "the walls are uncertain: this may not be a room, or not an indoor photo"
+    numbers = {"wall_deg": math.degrees(height), "corner": corner, "wall_score": certain}
+    return (Flag("not_indoors", text, numbers),)

@@ -3,8 +3,9 @@
 """The composition root: which networks a pipeline consists of."""
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from panoscene.arrange import ArrangementSettings
@@ -86,14 +87,33 @@ def load_stages(
 
 
 class AtFirstUse:
-    """A stage that is loaded when it is first called, once."""
+    """A stage that is loaded when it is first called, once, whichever thread does so."""
 
     def __init__(self, make: Callable[[], Callable[..., Any]]) -> None:
-        self.ready = cache(make)
+        self._make = make
+        self._made: Callable[..., Any] | None = None
+        self._lock = Lock()
+
+    def ready(self) -> Callable[..., Any]:
+        """Return the stage, loaded."""
+        with self._lock:
+            if self._made is None:
+                self._made = self._make()
+            return self._made
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Return what the stage says."""
         return self.ready()(*arguments, **options)
+
+
+def load_steps(stages: Stages) -> list[Callable[[], object]]:
+    """Return what loads the stages that are not loaded yet, in the order of their use.
+
+    Who has nothing to do while the first stages work can take the steps in another thread. An
+    error of a step comes again when its stage is used.
+    """
+    order = (stages.leveller, stages.detector, stages.layout, stages.context or stages.pose)
+    return [stage.ready for stage in (*order, stages.shape) if isinstance(stage, AtFirstUse)]
 
 
 def _load_stage(stage: str, edition: Edition, file: Path | None, device: str) -> Callable[..., Any]:

@@ -106,7 +106,7 @@ class Pipeline:
             with clock("shape"):
                 shapes = self._stages.shape(seen, scene.objects, resolution=resolution)
                 scene = replace(scene, objects=replace(scene.objects, shapes=shapes))
-        flags = photo_flags(gaps, tilt) + scene_flags(read, layout, scene)
+        flags = photo_flags(gaps, tilt) + scene_flags(read, scene)
         return Reconstruction(scene, initial, seen, certificate, read, clock.seconds, flags)
 
     def _levelled(
@@ -167,10 +167,10 @@ class Pipeline:
             if self._settings is not None:
                 start = scene
                 if scene.relations is None:
-                    start = replace(scene, relations=_relations(scene, "any_corner"))
+                    start = replace(scene, relations=_relations(scene))
                 arrangement = arrange(start, self._settings)
                 scene, certificate = arrangement.scene, arrangement.certificate
-            return replace(scene, relations=_relations(scene, "full")), certificate
+            return replace(scene, relations=_relations(scene)), certificate
 
 
 @dataclass(slots=True)
@@ -194,9 +194,7 @@ def _reduced(image: Float[Tensor, "3 height width"]) -> Float[Tensor, "3 rows co
     return torch.nn.functional.interpolate(image[None], size=SIZE, mode=mode)[0]
 
 
-def _relations(scene: Scene, inside: str) -> Relations:
+def _relations(scene: Scene) -> Relations:
+    """Return the relations of a scene's boxes, which may stand out of the room by centimetres."""
     boxes, height = scene.objects.boxes, scene.panorama.camera_height
-    if inside == "full":
-        return relations_from_boxes(boxes, scene.layout, height)
-    # boxes that are wrong by more than a tolerance are inside if a corner of them is
     return relations_from_boxes(boxes, scene.layout, height, inside="any_corner")

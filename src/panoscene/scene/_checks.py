@@ -187,7 +187,7 @@ def _shape_problems(objects: list[ObjectModel]) -> list[Problem]:
                 Problem(f"$.objects[{k}].shape.code", f"{lengths[k]} numbers", expected)
             )
         mesh = item.shape.mesh if item.shape else None
-        highest = max((max(face) for face in mesh.faces), default=-1) if mesh else -1
+        highest = max(map(max, mesh.faces), default=-1) if mesh else -1
         if mesh and highest >= len(mesh.vertices):
             expected = f"indices below {len(mesh.vertices)}, the number of vertices"
             problems.append(

@@ -60,6 +60,14 @@ def formatted(value: Any, indent: str = "") -> str:
     children: list[Any] = list(value.values() if is_object else value)  # pyright: ignore
     if not any(isinstance(child, dict | list) for child in children):
         return _ENCODER.encode(value)
+    if not is_object and all(type(child) is list for child in children):
+        text = _ENCODER.encode(value)
+        # a table of numbers, as the vertices of a mesh: encoded in one piece, three times as fast
+        if not set('"{') & set(text) and text.count("[") == len(children) + 1:
+            if len(indent) + len(text) <= _LINE:
+                return text
+            rows = text[1:-1].replace("], [", f"],\n{deeper}[")
+            return f"[\n{deeper}{rows}\n{indent}]"
     parts = [formatted(child, deeper) for child in children]
     if is_object:
         keys = [_ENCODER.encode(key) for key in value]  # pyright: ignore

@@ -5,8 +5,6 @@ import os
 from pathlib import Path
 from typing import Any, cast
 
-import networkx
-
 from ._atomic import write_atomically
 from ._categories import CATEGORIES
 from ._numbers import numbers_from_tensor
@@ -51,6 +49,8 @@ def write_graphml(scene: Scene, path: str | os.PathLike[str], *, threshold: floa
     Raises:
         ValueError: The scene has no relations, or the threshold is not in (0, 1].
     """
+    import networkx  # noqa: PLC0415 (who only describes scenes does not wait for it)
+
     document = relation_graph(scene, threshold=threshold)
     graph = cast(Any, networkx.MultiDiGraph(name=_xml_text(document["name"]), threshold=threshold))
     for node in document["nodes"]:

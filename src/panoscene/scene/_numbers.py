@@ -7,6 +7,8 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
+_FEW_DIGITS = 4
+
 
 def numbers_from_tensor(tensor: Shaped[Tensor, "..."]) -> Any:
     """Return a tensor as (nested lists of) Python numbers that give the same tensor back.
@@ -24,6 +26,10 @@ def numbers_from_tensor(tensor: Shaped[Tensor, "..."]) -> Any:
     wide = array.astype(np.float64)
     if not np.isfinite(wide).all():
         return wide.tolist()
+    # below 100, decimals of few digits differ from all others: no need to write them out
+    rounded = np.round(wide, _FEW_DIGITS)
+    if (np.abs(wide) < 100).all() and (rounded.astype(np.float32) == array).all():
+        return rounded.tolist()
     shortest = array.astype(np.str_).astype(np.float64)
     return np.where(shortest.astype(np.float32) == array, shortest, wide).tolist()
 

@@ -51,6 +51,7 @@ from ._context_scores import (
 )
 from ._context_views import ViewedScenes, said_by, viewed_scenes
 from ._errors import TrainError
+from ._panoramas import training_panoramas
 from ._pose import birds_eye
 from ._precompute_estimates import check_estimates
 from ._recipe import TrainRecipe
@@ -124,7 +125,7 @@ class ContextTask(Task):
         weights = options.pose or shipped_weights("pose")
         check_estimates(options.estimates, recipe.data, recipe.edition, weights)
         records = read_estimate_records(options.estimates)
-        self.scenes = read_context_scenes(open_dataset(recipe.data, "train")[:], records)
+        self.scenes = read_context_scenes(training_panoramas(recipe.data, recipe), records)
         self.validation = read_context_scenes(open_dataset(recipe.data, "val")[:], records)
         stage = load_pose_stage(recipe.edition, weights)
         self.pose = stage.network

@@ -28,11 +28,12 @@ from panoscene.models.detector import (
     load_coco_weights,
 )
 from panoscene.scene import Detections, upright_photo
-from panoscene.synth.dataset import PanoramaItem, open_dataset
+from panoscene.synth.dataset import open_dataset
 
 from ._detector_pictures import detector_picture
 from ._detector_scores import detector_scores
 from ._errors import TrainError
+from ._panoramas import training_panoramas
 from ._recipe import TrainRecipe
 from ._task import SELECTION, Task
 
@@ -81,7 +82,7 @@ class DetectorTask(Task):
         if self.options.seam is not None:
             config = config.model_copy(update={"seam": self.options.seam})
         self.network_config = config
-        train: Sequence[PanoramaItem] = open_dataset(data, "train")[:]
+        train = training_panoramas(data, recipe)
         self.order = repeated_items(train, self.options.rare_share)
         self.samples = DetectorSamples(
             train, config, self.options.rules, cached=self.options.cached

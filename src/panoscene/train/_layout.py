@@ -26,6 +26,7 @@ from panoscene.synth.dataset import open_dataset
 
 from ._errors import TrainError
 from ._layout_pictures import layout_picture
+from ._panoramas import training_panoramas
 from ._recipe import TrainRecipe
 from ._task import SELECTION, Task
 
@@ -65,7 +66,7 @@ class LayoutTask(Task):
         self.network_config = CONFIGS[recipe.edition]
         size = (self.network_config.image_height, self.network_config.image_width)
         cached = self.options.cached
-        self.samples = LayoutSamples(open_dataset(data, "train")[:], size, cached=cached)
+        self.samples = LayoutSamples(training_panoramas(data, recipe), size, cached=cached)
         self.validation = LayoutSamples(open_dataset(data, "val")[:], size, cached=0)
         self.network = build_layout(self.network_config, imagenet=recipe.imagenet)
         self.model = self.network

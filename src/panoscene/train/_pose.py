@@ -30,6 +30,7 @@ from panoscene.scene import Detections, Layout, Objects, Scene
 from panoscene.synth.dataset import open_dataset
 
 from ._errors import TrainError
+from ._panoramas import training_panoramas
 from ._pose_scores import detection_scores, floor_box_objects, paired_errors
 from ._recipe import TrainRecipe
 from ._task import SELECTION, Task
@@ -76,7 +77,7 @@ class PoseTask(Task):
         self.network_config = CONFIGS[recipe.edition]
         folder = self.options.detections
         found = {} if folder is None else read_stage_records(folder)
-        self.scenes = read_pose_scenes(open_dataset(data, "train")[:], found)
+        self.scenes = read_pose_scenes(training_panoramas(data, recipe), found)
         self.validation = read_pose_scenes(open_dataset(data, "val")[:], found)
         self.network = build_pose(self.network_config, imagenet=recipe.imagenet)
         self.model = self.network

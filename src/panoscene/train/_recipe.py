@@ -30,6 +30,8 @@ class TrainRecipe(BaseModel):
     edition: Edition
     data: Path | None = None
     """Folder of the data set; ``--data`` of the command goes before."""
+    panoramas: Positive | None = None
+    """Panoramas of the training part that are learned from, home after home; None for all."""
     steps: Positive
     """Of the optimiser."""
     batch_size: Positive

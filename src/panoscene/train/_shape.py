@@ -44,6 +44,7 @@ from panoscene.models.shape import (
 from panoscene.synth.assets import load_library
 
 from ._errors import TrainError
+from ._panoramas import training_panoramas
 from ._recipe import TrainRecipe
 from ._shape_pictures import mesh_sheet
 from ._task import SELECTION, Task
@@ -88,7 +89,8 @@ class ShapeTask(Task):
         if self.options.prepare:
             if recipe.data is None:
                 raise TrainError("recipe", "data: found none, expected the folder of a data set")
-            prepare_shape_data(recipe.data, assets, folder)
+            training_panoramas(recipe.data, recipe)  # refuses more than there are
+            prepare_shape_data(recipe.data, assets, folder, panoramas=recipe.panoramas)
         self.shapes = read_store(folder / MODELS, assets)
         if not self.shapes:
             raise TrainError(folder / MODELS, "found no models, expected some .npz files")
@@ -97,7 +99,7 @@ class ShapeTask(Task):
         seen = [name for name, shape in self.shapes.items() if shape.split == "seen"]
         self.seen = seen[: self.options.models]
         self.unseen = [name for name in self.shapes if self.shapes[name].split == "unseen"]
-        self.crops = _crops(folder, "train")
+        self.crops = _crops(folder, "train", recipe.panoramas)
         self.validation_crops = _crops(folder, "val")
         self.entries = self._entries()
         self.weights = ShapeWeights(near=self.options.near_weight)
@@ -289,9 +291,13 @@ def shape_task(recipe: TrainRecipe) -> Task:
     return ShapeTask(recipe)
 
 
-def _crops(folder: Path, split: str) -> ObjectCrops | None:
-    path = crops_file(folder, split)
-    return read_object_crops(path) if path.is_file() else None
+def _crops(folder: Path, split: str, panoramas: int | None = None) -> ObjectCrops | None:
+    path = crops_file(folder, split, panoramas)
+    if path.is_file():
+        return read_object_crops(path)
+    if panoramas is not None:
+        raise TrainError(path, "found no such file, expected the crops that prepare: true makes")
+    return None
 
 
 def _iou(found: Tensor, truth: Tensor) -> float:

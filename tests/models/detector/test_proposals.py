@@ -47,7 +47,7 @@ def test_choices_keep_to_their_shares() -> None:
 def test_anchors_stand_on_every_cell() -> None:
     config = CONFIGS["compact"]
     network = ProposalNetwork(config)
-    pyramid = [torch.zeros(1, 64, 64 // 2**k, 192 // 2**k) for k in range(4)]
+    pyramid = [torch.zeros(1, 64, 64 // 2**k, 192 // 2**k) for k in range(len(config.anchors))]
     anchors = network.anchors(pyramid, Frame(256, 768, 768.0))
     shapes = len(config.anchors[0])
     assert len(anchors) == shapes * sum(level[0, 0].numel() for level in pyramid)

@@ -5,7 +5,7 @@ import pytest
 import torch
 import trimesh
 
-from panoscene.models.shape._fewer import _parted, _unfolded, fewer_faces, is_closed
+from panoscene.models.shape._fewer import _gathered, _parted, _unfolded, fewer_faces, is_closed
 from panoscene.scene import Mesh, box_mesh
 
 
@@ -55,3 +55,22 @@ def test_sheets_that_touch_in_an_edge_are_parted() -> None:
 def test_triangles_back_to_back_go() -> None:
     faces = np.array([[0, 1, 2], [3, 4, 5], [2, 1, 0]])
     assert _unfolded(faces).tolist() == [[3, 4, 5]]
+
+
+def test_of_three_triangles_on_one_another_one_is_left() -> None:
+    faces = np.array([[0, 1, 2], [3, 4, 5], [2, 1, 0], [1, 2, 0]])
+    found = _unfolded(faces)
+    assert len(found) == 2
+    assert [3, 4, 5] in found.tolist()
+    first = next(face for face in found.tolist() if 0 in face)
+    assert first in ([0, 1, 2], [1, 2, 0])
+
+
+def test_flat_places_are_gathered_and_stay_closed() -> None:
+    box = trimesh.creation.box((1, 1, 1))
+    for _ in range(5):
+        box = box.subdivide()
+    points, faces = _gathered(box.vertices, box.faces.astype(np.int64), 500)
+    assert len(faces) < len(box.faces) / 2
+    assert is_closed(faces)
+    assert trimesh.Trimesh(points, faces, process=False).volume == pytest.approx(1, rel=0.02)

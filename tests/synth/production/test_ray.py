@@ -39,6 +39,7 @@ def noting_nodes(render: Callable[[RenderTask], None]) -> Callable[[RenderTask],
     return noted
 
 
+@pytest.mark.slow
 def test_two_nodes_share_the_homes_and_failures_are_told(
     cluster: Any,
     tmp_path: Path,

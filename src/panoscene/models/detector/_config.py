@@ -21,7 +21,7 @@ class DetectorConfig(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     backbone: BackboneName
-    width: Annotated[int, Field(multiple_of=32, ge=64)]
+    width: Annotated[int, Field(multiple_of=64, ge=64)]
     """Columns that the whole panorama is scaled to; its rows become half as many."""
     first_row: Annotated[int, Field(ge=0)] = 0
     """The network sees ``rows`` rows from this one on; what is above hardly shows objects."""
@@ -89,7 +89,10 @@ CONFIGS: dict[Edition, DetectorConfig] = {
         frozen=("conv_stem", "bn1", "blocks.0", "blocks.1"),
         fold_norms=True,
         channels=64,
-        anchors=tuple(_anchors(size, (0.45, 1.0, 1.8, 3.6)) for size in (14.0, 28.0, 56.0, 112.0)),
+        extra_level=True,
+        anchors=tuple(
+            _anchors(size, (0.45, 1.0, 1.8, 3.6)) for size in (14.0, 28.0, 56.0, 112.0, 224.0)
+        ),
         proposal_layers=0,
         anchor_samples=192,
         candidates=(200, 150),

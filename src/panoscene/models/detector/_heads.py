@@ -1,25 +1,23 @@
 """What is in a proposal: its category, its box, its mask."""
 
-import math
+from collections import OrderedDict
+from collections.abc import Sequence
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor, nn
-from torchvision.models.detection._utils import BoxCoder
-from torchvision.models.detection.faster_rcnn import TwoMLPHead
-from torchvision.models.detection.mask_rcnn import MaskRCNNHeads, MaskRCNNPredictor
-from torchvision.ops import roi_align
 
 from panoscene.scene import CATEGORIES
 
+from ._box_codes import BoxCoder
 from ._boxes import Frame, nearest_turn, suppress, within_picture
 from ._config import DetectorConfig
 from ._proposals import choose, match_boxes
+from ._regions import read_regions
 from ._targets import DetectorTargets, RegionPredictions, mask_targets
 
 _BOX_CELLS, _MASK_CELLS = 7, 14
-_SAMPLES = 2
 _SAME_OBJECT = 0.5
 _START = {
     "mask_predictor.mask_fcn_logits.weight": 1e-3,
@@ -27,6 +25,19 @@ _START = {
     "box_predictor.bbox_pred.weight": 1e-3,
 }
 """Standard deviations of the last layers' start weights."""
+
+
+class BoxHead(nn.Module):
+    """Two layers on the features of a box."""
+
+    def __init__(self, inputs: int, width: int) -> None:
+        super().__init__()
+        self.fc6 = nn.Linear(inputs, width)
+        self.fc7 = nn.Linear(width, width)
+
+    def forward(self, features: Float[Tensor, "n channels cells cells"]) -> Tensor:
+        """Return one vector (n, width) for each box."""
+        return self.fc7(self.fc6(features.flatten(1)).relu()).relu()
 
 
 class BoxPredictor(nn.Module):
@@ -43,22 +54,22 @@ class BoxPredictor(nn.Module):
 
 
 class RegionHeads(nn.Module):
-    """Torchvision's box and mask heads, reading a pyramid that may go around."""
+    """Mask R-CNN's box and mask heads, with torchvision's names, on a pyramid, round or not."""
 
     def __init__(self, config: DetectorConfig) -> None:
         super().__init__()
         self.config = config
         kinds = len(CATEGORIES) + 1 if config.per_category else 1
         width = config.head_width
-        self.box_head = TwoMLPHead(config.channels * _BOX_CELLS**2, width)
+        self.box_head = BoxHead(config.channels * _BOX_CELLS**2, width)
         self.box_predictor = BoxPredictor(width, kinds)
-        self.mask_head = MaskRCNNHeads(config.channels, config.mask_channels, 1)
+        self.mask_head = _mask_head(config.channels, config.mask_channels)
         last = config.mask_channels[-1]
-        self.mask_predictor = MaskRCNNPredictor(last, last, kinds)
+        self.mask_predictor = _mask_predictor(last, kinds)
         # features of the backbone may be large: start near indifference
         for name, deviation in _START.items():
             nn.init.normal_(self.get_parameter(name), std=deviation)
-        self.coder = BoxCoder((10.0, 10.0, 5.0, 5.0))
+        self.coder = BoxCoder(shift=10.0, growth=5.0)
 
     def losses(
         self,
@@ -77,7 +88,7 @@ class RegionHeads(nn.Module):
         counts = [int((m >= 0).sum()) for m in match]
         gold = torch.cat([t.boxes[m[:n]] for t, m, n in zip(targets, match, counts, strict=True)])
         flat = torch.cat(boxes)[positive]
-        code = self.coder.encode_single(nearest_turn(gold, flat, period), flat)
+        code = self.coder.encode(nearest_turn(gold, flat, period), flat)
         kind = label[positive] if self.config.per_category else torch.zeros_like(label[positive])
         row = torch.arange(len(kind), device=kind.device)
         terms["box"] = F.smooth_l1_loss(
@@ -158,7 +169,7 @@ class RegionHeads(nn.Module):
         score = score[:, 1:]
         row, category = (score > self.config.score_threshold).nonzero().unbind(-1)
         kind = category + 1 if self.config.per_category else torch.zeros_like(category)
-        boxes = self.coder.decode_single(codes[row, kind], proposals[row])
+        boxes = self.coder.decode(codes[row, kind], proposals[row])
         boxes = within_picture(boxes, frame)
         score = score[row, category]
         solid = ((boxes[:, 2:] - boxes[:, :2]) > 1.0).all(-1)
@@ -168,37 +179,23 @@ class RegionHeads(nn.Module):
         return boxes[kept], category[kept], score[kept]
 
 
-def read_regions(
-    pyramid: list[Tensor],
-    boxes: list[Tensor],
-    cells: int,
-    period: float | None,
-    canonical_size: float,
-) -> Float[Tensor, "n channels {cells} {cells}"]:
-    """Return the features of boxes, each from the level that suits its size.
+def _mask_head(channels: int, widths: Sequence[int]) -> nn.Sequential:
+    blocks = []
+    for given, made in zip((channels, *widths), widths, strict=False):
+        layer = nn.Conv2d(given, made, 3, padding=1)
+        nn.init.kaiming_normal_(layer.weight, mode="fan_out", nonlinearity="relu")
+        if layer.bias is not None:
+            nn.init.zeros_(layer.bias)
+        blocks.append(nn.Sequential(layer, nn.ReLU(inplace=True)))
+    return nn.Sequential(*blocks)
 
-    Args:
-        pyramid: Strides 4, 8, 16 and 32; a fifth level is not read.
-        boxes: Of each picture.
-        cells: Rows and columns that a box is cut into.
-        period: Of the cylinder: boxes go on at the left edge.
-        canonical_size: Boxes of this size (root of the area) are read from stride 16.
-    """
-    flat = torch.cat(boxes)
-    picture = torch.cat([torch.full_like(b[:, :1], k) for k, b in enumerate(boxes)])
-    area = (flat[:, 2] - flat[:, 0]) * (flat[:, 3] - flat[:, 1])
-    place = (2 + (area.clamp_min(1e-6).sqrt() / canonical_size + 1e-6).log2()).floor()
-    place = place.clamp(0, 3).long()
-    regions = torch.cat((picture, flat), -1)
-    index, parts = [], []
-    for k, level in enumerate(pyramid[:4]):
-        here = (place == k).nonzero()[:, 0]
-        stride = 4 * 2**k
-        if period is not None and len(here):
-            # as far as boxes of this level reach; the reading needs one column more
-            beyond = math.ceil((float(flat[here, 2].max()) - period) / stride) + 1
-            level = torch.cat((level, level[..., : max(beyond, 1)]), -1)  # noqa: PLW2901
-        parts.append(roi_align(level, regions[here], cells, 1 / stride, _SAMPLES))
-        index.append(here)
-    order: Int[Tensor, " n"] = torch.cat(index).argsort()
-    return torch.cat(parts)[order]
+
+def _mask_predictor(width: int, kinds: int) -> nn.Sequential:
+    larger, logits = nn.ConvTranspose2d(width, width, 2, 2), nn.Conv2d(width, kinds, 1)
+    for layer in (larger, logits):
+        nn.init.kaiming_normal_(layer.weight, mode="fan_out", nonlinearity="relu")
+    return nn.Sequential(
+        OrderedDict[str, nn.Module](
+            conv5_mask=larger, relu=nn.ReLU(inplace=True), mask_fcn_logits=logits
+        )
+    )

@@ -6,11 +6,10 @@ import torch
 import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
-from torchvision.models.detection._utils import BoxCoder
-from torchvision.models.detection.rpn import RPNHead, concat_box_prediction_layers
 
 from panoscene.models._circular import make_circular
 
+from ._box_codes import BoxCoder
 from ._boxes import Frame, box_overlaps, nearest_turn, suppress, within_picture
 from ._config import DetectorConfig
 from ._targets import DetectorTargets
@@ -22,16 +21,43 @@ _LEAST_SIDE = 1e-3
 _IGNORE_SHARE = 0.5  # a box with more of itself in an ignored one teaches nothing
 
 
+class ProposalHead(nn.Module):
+    """Scores and shifts of the anchors at each pixel, with torchvision's names."""
+
+    def __init__(self, channels: int, anchors: int, layers: int) -> None:
+        super().__init__()
+        self.conv = nn.Sequential(
+            *(
+                nn.Sequential(nn.Conv2d(channels, channels, 3, padding=1), nn.ReLU(inplace=True))
+                for _ in range(layers)
+            )
+        )
+        self.cls_logits = nn.Conv2d(channels, anchors, 1)
+        self.bbox_pred = nn.Conv2d(channels, anchors * 4, 1)
+        for layer in self.modules():
+            if isinstance(layer, nn.Conv2d):
+                nn.init.normal_(layer.weight, std=0.01)
+                if layer.bias is not None:
+                    nn.init.zeros_(layer.bias)
+
+    def forward(self, level: Float[Tensor, "batch channels rows columns"]) -> tuple[Tensor, Tensor]:
+        """Return logits (batch, n) and codes (batch, n, 4), by rows, columns and anchors."""
+        features = self.conv(level)
+        logits = self.cls_logits(features).permute(0, 2, 3, 1).flatten(1)
+        codes = self.bbox_pred(features).permute(0, 2, 3, 1).flatten(1)
+        return logits, codes.unflatten(1, (-1, 4))
+
+
 class ProposalNetwork(nn.Module):
-    """Torchvision's proposal head on a pyramid, with anchors that know the cylinder."""
+    """The proposal head on a pyramid, with anchors that know the cylinder."""
 
     def __init__(self, config: DetectorConfig) -> None:
         super().__init__()
         self.config = config
-        self.head = RPNHead(config.channels, len(config.anchors[0]), config.proposal_layers)
+        self.head = ProposalHead(config.channels, len(config.anchors[0]), config.proposal_layers)
         if config.seam == "circular":
             make_circular(self.head)
-        self.coder = BoxCoder((1.0, 1.0, 1.0, 1.0))
+        self.coder = BoxCoder()
 
     def forward(
         self,
@@ -40,12 +66,11 @@ class ProposalNetwork(nn.Module):
         targets: list[DetectorTargets] | None,
     ) -> tuple[list[Tensor], dict[str, Tensor]]:
         """Return proposals (n, 4) of each picture, and the losses where there are targets."""
-        maps, shifts = self.head(pyramid)
-        counts = [level.shape[1] * level.shape[2] * level.shape[3] for level in maps]
-        logits, shifts = concat_box_prediction_layers(maps, shifts)
+        outputs = [self.head(level) for level in pyramid]
+        counts = [logit.shape[1] for logit, _ in outputs]
+        logits, shifts = (torch.cat(part, 1) for part in zip(*outputs, strict=True))
         anchors = self.anchors(pyramid, frame)
         batch = pyramid[0].shape[0]
-        logits, shifts = logits.reshape(batch, -1), shifts.reshape(batch, -1, 4)
         with torch.no_grad():
             proposals = [
                 self._best(
@@ -91,7 +116,7 @@ class ProposalNetwork(nn.Module):
         boxes, scores = [], []
         for logit, shift, anchor in zip(logits, shifts, anchors, strict=True):
             score, index = logit.topk(min(self.config.candidates[phase], len(logit)))
-            box = within_picture(self.coder.decode_single(shift[index], anchor[index]), frame)
+            box = within_picture(self.coder.decode(shift[index], anchor[index]), frame)
             solid = ((box[:, 2:] - box[:, :2]) > _LEAST_SIDE).all(-1)
             box, score = box[solid], score[solid]
             kept = suppress(box, score, None, _SUPPRESS_ABOVE, frame.period)
@@ -125,7 +150,7 @@ class ProposalNetwork(nn.Module):
         if not len(positive):
             return objectness, shifts.sum() * 0
         gold = nearest_turn(targets.boxes[match[positive]], anchors[positive], period)
-        code = self.coder.encode_single(gold, anchors[positive])
+        code = self.coder.encode(gold, anchors[positive])
         box = F.smooth_l1_loss(shifts[positive], code, beta=1 / 9, reduction="sum")
         return objectness, box / len(chosen)
 

@@ -3,15 +3,21 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
+from torch.nn import functional as F
 
 from ._elements import Elements
 from ._network import ShapeNetwork
 
-NEGLIGIBLE = 1e-3
-"""Elements whose Gaussian times constant is smaller at a point are left out there."""
-_POINTS = 32_768
+NEGLIGIBLE = 2e-3
+"""Elements whose Gaussian times constant is smaller at all points of a group are left out there."""
+_GROUP = 32
+"""Neighbouring points that are worked on together."""
+_GROUPS = 128
+"""Of one element, worked on at a time: as many as the cache of a core holds."""
+_POINTS = 65_536
+_SPAN, _BITS = 1.4, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,58 +25,70 @@ class FastField:
     """Shapes in a form that is quick to evaluate.
 
     The exponents of all Gaussians at a point are one matrix product: they are polynomials of the
-    second degree. Each layer of the local decoder is merged with the normalisations around it.
+    second degree. So is the first layer of the local decoder, together with whatever is linear in
+    it; each layer is merged with the normalisations around it.
     """
 
-    polynomial: Float[Tensor, "shapes 10 elements"]
-    """Exponents less the largest that is not negligible: negative where an element matters."""
-    enter: Float[Tensor, "shapes elements 4 width"]
-    """(x, y, z, 1) to the first layer."""
-    middle: Float[Tensor, "shapes elements width width"]
-    shift: Float[Tensor, "shapes elements width"]
-    leave: Float[Tensor, "shapes elements 2 width"]
-    """Weights of the first layer and of the middle one in the result."""
-    added: Float[Tensor, "shapes elements"]
-    """What the decoder gives besides."""
+    polynomial: Float[Tensor, "shapes elements 10"]
+    """Exponents plus the logarithm of the constant: above 0 where an element matters."""
+    enter: Float[Tensor, "shapes elements width_and_3 10"]
+    """From a point to the first layer, 1, the linear part of the result, and the exponent."""
+    middle: Float[Tensor, "shapes elements width width_and_1"]
+    leave: Float[Tensor, "shapes elements 1 width"]
+    """Weights of the middle layer in the result."""
 
     def __call__(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
         """Return the field of one shape.
 
         Args:
             shape: Number of the shape.
-            points: In the network's frame.
+            points: In the network's frame; the closer those behind one another, the better.
         """
-        found = torch.zeros(len(points), dtype=points.dtype, device=points.device)
-        for first in range(0, len(points), _POINTS):
-            piece = slice(first, first + _POINTS)
-            self._add(found[piece], shape, points[piece])
+        found = points.new_zeros(len(points))
+        order = _by_place(points)
+        for place in order.split(_POINTS):
+            found[place] = self._together(shape, points.index_select(0, place))
         return found
 
-    def _add(self, found: Tensor, shape: int, points: Float[Tensor, "n 3"]) -> None:
-        """Add the field of one shape at points, element by element."""
-        x, y, z = points.unbind(-1)
-        one = torch.ones_like(x)
-        terms = torch.stack((x * x, y * y, z * z, x * y, x * z, y * z, x, y, z, one))
-        exponent = self.polynomial[shape].t() @ terms
-        element, place = (exponent < 0).nonzero(as_tuple=True)
-        counts = torch.bincount(element, minlength=len(exponent)).tolist()
-        # the exponent was moved so that it is 0 where an element becomes negligible
-        blob = (-0.5 * exponent[element, place]).exp_().mul_(-NEGLIGIBLE)
-        homogeneous = terms[6:].t().contiguous().index_select(0, place)
-        detail = torch.zeros_like(blob)
-        start = 0
-        for index, count in enumerate(counts):
-            if count:
-                here = slice(start, start + count)
-                first = homogeneous[here] @ self.enter[shape, index]
-                weight, other = self.leave[shape, index]
-                middle = torch.addmm(
-                    self.shift[shape, index], first.relu(), self.middle[shape, index]
-                ).relu_()
-                torch.addmv(first @ weight, middle, other, out=detail[here])
-                detail[here] += 1 + self.added[shape, index]
-                start += count
-        found.index_add_(0, place, detail.mul_(blob))
+    def _together(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
+        """Return the field of one shape: elements that matter to a group are added to all of it."""
+        terms = _terms(points, -len(points) % _GROUP)
+        most = (self.polynomial[shape] @ terms).unflatten(-1, (-1, _GROUP)).amax(-1)
+        terms = terms.unflatten(-1, (-1, _GROUP))
+        found = terms.new_zeros(terms.shape[1:])
+        width = self.middle.shape[-2]
+        parts = (self.enter[shape], self.middle[shape], self.leave[shape], most > 0)
+        for enter, middle, leave, active in zip(*parts, strict=True):
+            for group in active.nonzero()[:, 0].split(_GROUPS):
+                first = enter @ terms.index_select(1, group).flatten(1)
+                second = (middle @ first[: width + 1].relu()).relu_()
+                value = torch.addmm(first[width + 1 : width + 2], leave, second)
+                value *= first[width + 2].exp_()
+                found.index_add_(0, group, value.view(-1, _GROUP), alpha=-NEGLIGIBLE)
+        return found.flatten()[: len(points)]
+
+
+def _terms(points: Float[Tensor, "n 3"], more: int) -> Float[Tensor, "10 n_and_more"]:
+    """Return what polynomials of the second degree are made of; the last point comes again."""
+    found = points.new_ones(10, len(points) + more)
+    place = found[6:9]
+    place[:, : len(points)] = points.t()
+    if more:
+        place[:, len(points) :] = points[-1:].t()
+    torch.mul(place, place, out=found[:3])
+    torch.mul(place[:1], place[1:], out=found[3:5])
+    torch.mul(place[1], place[2], out=found[5])
+    return found
+
+
+def _by_place(points: Float[Tensor, "n 3"]) -> Int64[Tensor, " n"]:
+    """Return an order of points in which neighbours are close together (Morton 1966)."""
+    count = 2**_BITS
+    cell = ((points / _SPAN + 0.5) * count).clamp_(0, count - 1).long()
+    ticks = torch.arange(count, device=points.device)
+    spread = torch.stack([((ticks >> bit) & 1) << (3 * bit) for bit in range(_BITS)]).sum(0)
+    x, y, z = spread[cell].to(torch.int16).unbind(-1)
+    return ((x << 2) | (y << 1) | z).argsort(stable=True)
 
 
 def fast_field(network: ShapeNetwork, elements: Elements) -> FastField:
@@ -86,11 +104,11 @@ def fast_field(network: ShapeNetwork, elements: Elements) -> FastField:
     square = matrix.transpose(-1, -2) @ matrix
     linear = -2 * (matrix.transpose(-1, -2) @ moved[..., None])[..., 0]
     limit = 2 * (elements.constant.abs().clamp(min=1e-12) / NEGLIGIBLE).log()
-    polynomial = torch.stack(
+    polynomial = -0.5 * torch.stack(
         (square[..., 0, 0], square[..., 1, 1], square[..., 2, 2],
          2 * square[..., 0, 1], 2 * square[..., 0, 2], 2 * square[..., 1, 2],
          linear[..., 0], linear[..., 1], linear[..., 2],
-         moved.square().sum(-1) - limit), 1,
+         moved.square().sum(-1) - limit), -1,
     )  # fmt: skip
     g1, b1, g2, b2, g3, b3 = decoder.modulation(elements.latent).unbind(-2)
     norms = (decoder.norm1, decoder.norm2, decoder.norm3)
@@ -102,17 +120,19 @@ def fast_field(network: ShapeNetwork, elements: Elements) -> FastField:
     into, out = decoder.enter, decoder.leave.weight[0]
     local = into.weight @ matrix
     shift = into.bias - (into.weight @ moved[..., None])[..., 0]
-    enter = torch.cat(
-        ((local * g1[..., None]).transpose(-1, -2), (shift * g1 + b1)[..., None, :]), -2
-    )
+    first = torch.cat((local * g1[..., None], (shift * g1 + b1)[..., None]), -1)
     weight = g3 * out
-    leave = torch.stack((weight, weight @ decoder.outer.weight), -2)
-    added = (weight * decoder.outer.bias + b3 * out).sum(-1) + decoder.leave.bias
+    straight = weight[..., None, :] @ first
+    straight[..., -1] += (weight * decoder.outer.bias + b3 * out).sum(-1)[..., None]
+    straight[..., -1] += decoder.leave.bias + 1
+    one = torch.zeros_like(straight)
+    one[..., -1] = 1
+    enter = F.pad(torch.cat((first, one, straight), -2), (6, 0))
+    middle = decoder.inner.weight * g2[..., :, None]
+    bias = b2 + g2 * decoder.inner.bias
     return FastField(
-        polynomial=polynomial.contiguous(),
-        enter=enter.contiguous(),
-        middle=(decoder.inner.weight.t() * g2[..., None, :]).contiguous(),
-        shift=b2 + g2 * decoder.inner.bias,
-        leave=leave,
-        added=added,
+        polynomial=polynomial,
+        enter=torch.cat((enter, polynomial[..., None, :]), -2),
+        middle=torch.cat((middle, bias[..., None]), -1),
+        leave=(weight @ decoder.outer.weight)[..., None, :],
     )

@@ -13,7 +13,7 @@ from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh
 
 from ._config import CONFIGS
 from ._extract import extract_meshes
-from ._fewer import FACES_PER_CELL, fewer_faces
+from ._fewer import FACES_PER_CELL
 from ._network import ShapeNetwork, build_shape, view_hints
 
 THIN_METRES = 0.03
@@ -58,13 +58,14 @@ class ShapeStage:
         """
         codes = self.codes(image, objects)
         network = (~thin_boxes(objects.boxes.size)).nonzero()[:, 0]
-        found = extract_meshes(self.network, codes[network], resolution=resolution)
+        most = FACES_PER_CELL * resolution
+        found = extract_meshes(self.network, codes[network], resolution=resolution, most=most)
         meshes: list[Mesh] = [box_mesh() for _ in range(len(objects.boxes))]
         sources: list[ShapeSource] = ["slab"] * len(meshes)
         for index, mesh in zip(network.tolist(), found, strict=True):
             sources[index] = "box" if mesh is None else "network"
             if mesh is not None:
-                meshes[index] = fewer_faces(mesh, FACES_PER_CELL * resolution)
+                meshes[index] = mesh
         return Shapes(code=codes.cpu(), mesh=tuple(meshes), source=tuple(sources))
 
     @torch.inference_mode()
