@@ -76,6 +76,7 @@ def tables() -> dict[str, str]:
         "safety": safety_table(measured["safety"]) + " (`panoscene experiment safety`)",
         **upright_text(),
         **curves_text(),
+        **detector_text(),
         **shape_text(),
         **synth_text(),
         **seconds_text("stages"),
@@ -114,6 +115,25 @@ def seconds_text(name: str) -> dict[str, str]:
         f"{machine['processor']}, {machine['cores']} cores."
     )
     return {name: f"{seconds_table(measured)}\n\n{text}"}
+
+
+def detector_text() -> dict[str, str]:
+    """Return the detector's scores on each part of the set; nothing before all were measured."""
+    files = [ROOT / "benchmarks" / f"detector{part}.json" for part in ("-train", "", "-test")]
+    if not all(file.is_file() for file in files):
+        return {}
+    names = ("mask_ap50", "box_ap50", "bfov_recall", "bfov_recall_any")
+    lines = [
+        "| part | panoramas | mask AP50 | box AP50 | BFoV recall | of any category |",
+        "| --- | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for file in files:
+        measured = json.loads(file.read_text())
+        scores = measured["scores"]["circular"]
+        cells = [f"{100 * scores[name]:.1f}" for name in names]
+        part = measured["split"]
+        lines.append(f"| {part} | {measured['panoramas']} | {' | '.join(cells)} |")
+    return {"detector-parts": "\n".join(lines)}
 
 
 def curves_text() -> dict[str, str]:

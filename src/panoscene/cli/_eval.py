@@ -153,7 +153,7 @@ def run_score(
                 description=facts.description,
                 fov_deg=facts.fov_deg,
                 data=data,
-                shapes=shapes,
+                shapes=shapes and (targets is not None or _has_meshes(folder)),
                 replicates=replicates,
                 workers=workers or os.cpu_count() or 1,
                 progress=advance,
@@ -170,6 +170,11 @@ def run_score(
     else:
         say(score_table(results, SUMMARY))
     return 0
+
+
+def _has_meshes(folder: Path) -> bool:
+    """Return whether a method predicts shapes; boxes that stand in for them need no score."""
+    return any(b'"mesh":' in file.read_bytes() for file in folder.glob("*.json"))
 
 
 def _warn(text: str) -> None:

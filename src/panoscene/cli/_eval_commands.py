@@ -112,7 +112,7 @@ def score(
         predictions: A folder made by eval export, or one of scene.json files.
         targets: Folder with the true scenes of the same names, for predictions alone.
         output: Folder that gets METHOD.json with all scores.
-        shapes: Compare meshes too, where the targets have them; slow.
+        shapes: Compare meshes too, where targets have them, of methods that predict some; slow.
         replicates: Bootstrap resamples behind the intervals; 0 for none.
         workers: Processes; one for each core without it.
         json: Print all scores instead of a short table.

@@ -57,9 +57,6 @@ def read_json_object(file: Path, what: str) -> dict[str, Any]:
     """Return the object in a JSON file; ``what`` says what is expected there."""
     try:
         document = json.loads(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"{file}: cannot be read: {reason}") from None
     except ValueError as error:
         raise InputError(f"{file}: found text that is not JSON ({error}), expected JSON") from None
     except RecursionError:

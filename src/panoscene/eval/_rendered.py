@@ -9,11 +9,18 @@ from panoscene.eval._export import MANIFEST, PREDICTIONS, TARGETS
 from panoscene.eval._methods import mean_box_scene
 from panoscene.eval._rendered_rows import ROWS
 from panoscene.pipeline import Given, Pipeline
-from panoscene.scene import Detections, Panorama, Scene, write_atomically, write_scene
+from panoscene.scene import (
+    Detections,
+    Panorama,
+    Scene,
+    Shapes,
+    write_atomically,
+    write_scene,
+)
 from panoscene.synth.dataset import PanoramaItem
 
 SHAPED = ("full", "true-detections")
-"""Rows with the meshes that the pipeline makes, if it does; the true boxes have the true ones."""
+"""Rows whose objects have meshes, if the pipeline makes some; the others are boxes."""
 
 
 def export_reconstructions(
@@ -99,7 +106,7 @@ def predicted_rows(item: PanoramaItem, truth: Scene, pipeline: Pipeline) -> dict
     told_all = replace(
         in_true_frame, detections=true_seen, layout=truth.layout, relations=truth.relations
     )
-    told_boxes = replace(found, objects=true_objects)
+    told_boxes = replace(found, objects=replace(true_objects, shapes=Shapes()))
     return {
         "full": full.scene,
         "without-arrangement": full.initial,

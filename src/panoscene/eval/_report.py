@@ -159,11 +159,11 @@ def _introduction(scores: Sequence[ScoreFile]) -> list[str]:
     elif rendered:
         parts.append(
             "```text\npanoscene synth render configs/synth/full.yaml data --limit 400\n"
-            "panoscene eval reconstruct data -o runs/test\n"
-            "panoscene eval score runs/test -o results\n"
-            "panoscene bench pipeline --json > pipeline.json\n"
-            "panoscene eval report results -o RESULTS.md --readme README.md --timings pipeline.json"
-            "\n```"
+            "panoscene eval reconstruct data -o runs/test --shapes\n"
+            "panoscene eval score runs/test -o results --shapes\n"
+            "panoscene bench pipeline --json > benchmarks/pipeline.json\n"
+            "panoscene eval report results -o RESULTS.md --readme README.md \\\n"
+            "    --timings benchmarks/pipeline.json\n```"
         )
     page = "the page `eval` of panoscene's docs"
     if ours:
