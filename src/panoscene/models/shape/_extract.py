@@ -5,14 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from scipy import ndimage
 from torch import Tensor
 from torch.nn import functional as F
 
 from panoscene.scene import Mesh
 
+from ._blocks import GAIN, finer_blocks, first_blocks
 from ._config import ISO_LEVEL, ShapeConfig
+from ._cubes import CELLS, march
 from ._fast_field import FastField, fast_field
 from ._fewer import fewer_faces
 from ._network import ShapeNetwork
@@ -21,10 +23,6 @@ COARSEST = 16
 """Cells along each axis of the grid that is evaluated everywhere."""
 _MARGIN = 0.5
 """Where the surface may be: this times the differences within a cell, beside its values."""
-_TOLERANCE = 0.1
-"""Error of parabolas that is let pass, in differences within a cell."""
-_GAIN = 4.0
-"""Parabolas on half as large cells are better by at least this, in smooth places by 8."""
 _LEVELS = (ISO_LEVEL, -0.055, -0.04, -0.025)
 _FILLED = 0.85
 _CRUMB = 0.01
@@ -44,11 +42,11 @@ def extract_meshes(
     """Return the surface of each shape in the canonical box [-1/2, 1/2]^3.
 
     The field is evaluated on 16 cells along each axis, and on 32 where the surface may be; then
-    cells that the surface passes through are divided until the resolution is reached (marching
-    cubes: Lorensen and Cline 1987). Where parabolas through the values on the coarser grid are as
-    good, to a tenth of a cell, they are taken instead of the field. Shapes are worked on side by
-    side, as many as PyTorch has threads. Loose pieces of less than 1 percent of
-    the volume are left out. Meshes are fitted to the box, axis by axis, as in the paper. A shape
+    only cells that the surface passes through are divided, until the resolution is reached
+    (marching cubes: Lorensen and Cline 1987). Where parabolas through the values on the coarser
+    grid are as good, to a tenth of a cell, they are taken instead of the field. Shapes are worked
+    on side by side, as many as PyTorch has threads. Loose pieces of less than 1 percent of the
+    volume are left out. Meshes are fitted to the box, axis by axis, as in the paper. A shape
     of a network that works in the box (``compact``) is drawn at a level above -0.07 when less would
     not fill the box; if that does not help, it stays where it is.
 
@@ -111,44 +109,26 @@ class _Shape:
         like = self.field.polynomial
         return torch.linspace(-self.reach, self.reach, nodes, dtype=like.dtype, device=like.device)
 
+    def at(self, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
+        return self.field(self.index, points)
+
     def everywhere(self) -> _Grid:
         """Return the field on 32 cells along each axis, exact where the surface may be."""
         axis = self.axis(COARSEST + 1)
-        values = self.field(self.index, torch.cartesian_prod(axis, axis, axis))
+        values = self.at(torch.cartesian_prod(axis, axis, axis))
         values = values.reshape(COARSEST + 1, COARSEST + 1, COARSEST + 1)
         least, most = _extremes(values)
         margin = _MARGIN * (most - least)
         near = (least - margin < _LEVELS[0]) & (most + margin > _LEVELS[-1])
-        unknown = torch.full_like(least, torch.inf)
-        grid = _Grid(values, torch.where(near, unknown, 0))
-        found = self.finer(grid, torch.ones_like(near), 0.0)
-        return _Grid(found.values, torch.where(found.error > 0, found.error, torch.inf))
-
-    def finer(
-        self, grid: _Grid, cells: Bool[Tensor, "c c c"], level: float, *, last: bool = False
-    ) -> _Grid:
-        """Return values on twice as many cells: new in some cells, else those of neighbours.
-
-        New values are those of parabolas where they are known to be good enough, else exact.
-        """
-        least, most = _extremes(grid.values)
-        rough = cells & (grid.error > _TOLERANCE * (most - least))
-        nodes = 2 * len(grid.values) - 1
-        guess = _between(grid.values)
-        doubled = grid.values[:, None, :, None, :, None].expand(-1, 2, -1, 2, -1, 2)
-        doubled = doubled.reshape(nodes + 1, nodes + 1, nodes + 1)[:nodes, :nodes, :nodes]
-        finer = torch.where(_nodes_of(cells, nodes), guess, doubled)
-        wanted = _nodes_of(rough, nodes)
+        guess = _between(values)
+        nodes = len(guess)
+        wanted = _nodes_of(near, nodes)
         wanted[::2, ::2, ::2] = False
-        place = wanted.flatten().nonzero()[:, 0]
         axis = self.axis(nodes)
-        x, y, z = place // (nodes * nodes), place // nodes % nodes, place % nodes
-        fresh = self.field(self.index, torch.stack((axis[x], axis[y], axis[z]), 1)) - level
-        finer.view(-1).index_copy_(0, place, fresh)
-        if last:
-            return _Grid(finer, grid.error)
-        known = torch.where(cells, grid.error, torch.inf)
-        error = torch.where(rough, _most_of(guess.sub_(finer).abs_()) / _GAIN, known)
+        place = wanted.nonzero()
+        finer = guess.clone()
+        finer[wanted] = self.at(axis[place])
+        error = torch.where(near, _most_of((guess - finer).abs_()) / GAIN, torch.inf)
         return _Grid(finer, _each_twice(error))
 
 
@@ -157,13 +137,24 @@ def _surface(shape: _Shape, config: ShapeConfig, resolution: int) -> Mesh | None
     level, fitted = _level(grid.values, config)
     values = _solid(grid.values, level)
     moved = _most_of((values != grid.values - level).to(values))
-    grid = _Grid(values, torch.where(_each_twice(moved) > 0, torch.inf, grid.error))
-    while len(grid.values) <= resolution:
-        least, most = _extremes(grid.values)
-        last = 2 * len(grid.values) > resolution
-        grid = shape.finer(grid, (least < 0) & (most >= 0), level, last=last)
-        _close(grid.values)
-    return _mesh(grid.values, config.reach, fitted=fitted)
+    blocks = first_blocks(values, torch.where(_each_twice(moved) > 0, torch.inf, grid.error))
+    if len(blocks.place) == 0:
+        return None
+    cells = len(grid.error)
+    while cells < resolution:
+        cells *= 2
+        axis = shape.axis(cells + 1)
+
+        def exact(node: Int64[Tensor, "n 3"], axis: Float[Tensor, " m"] = axis) -> Tensor:
+            return shape.at(axis[node]) - level
+
+        blocks = finer_blocks(blocks, exact, last=cells == resolution)
+    vertices, faces = march(blocks.values, blocks.cases, blocks.place, cells // CELLS)
+    vertices = vertices.cpu() * (2 * config.reach / cells) - config.reach
+    if fitted:
+        first, last = vertices.amin(0), vertices.amax(0)
+        vertices = (vertices - (first + last) / 2) / (last - first)
+    return Mesh(vertices.clamp(-0.5, 0.5), faces.cpu())
 
 
 def _between(values: Float[Tensor, "n n n"]) -> Float[Tensor, "m m m"]:
@@ -263,26 +254,6 @@ def _nodes_of(cells: Bool[Tensor, "m m m"], nodes: int) -> Bool[Tensor, "n n n"]
             part[tuple(steps)] |= found
         found = wider
     return found
-
-
-def _mesh(values: Float[Tensor, "n n n"], reach: float, *, fitted: bool) -> Mesh | None:
-    """Return the zero level of a grid, within the canonical box or fitted to it."""
-    from skimage.measure import marching_cubes  # noqa: PLC0415 (it takes a second)
-
-    inside = values < 0
-    if not bool(inside.any()):
-        return None
-    low, high = _bounds(inside)
-    part = values[low[0] : high[0], low[1] : high[1], low[2] : high[2]]
-    vertices, faces, _, _ = marching_cubes(
-        part.cpu().numpy(), 0.0, gradient_direction="descent", allow_degenerate=False
-    )
-    step = 2 * reach / (len(values) - 1)
-    found = (torch.from_numpy(vertices.copy()) + torch.tensor(low)) * step - reach
-    first, last = found.amin(0), found.amax(0)
-    if fitted:
-        found = (found - (first + last) / 2) / (last - first)
-    return Mesh(found.clamp(-0.5, 0.5), torch.from_numpy(faces).long())
 
 
 def _bounds(inside: Bool[Tensor, "n n n"]) -> tuple[list[int], list[int]]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -14,8 +14,8 @@ NEGLIGIBLE = 2e-3
 """Elements whose Gaussian times constant is smaller at all points of a group are left out there."""
 _GROUP = 32
 """Neighbouring points that are worked on together."""
-_GROUPS = 128
-"""Of one element, worked on at a time: as many as the cache of a core holds."""
+_ROWS, _BLOCKS = 8, 32
+"""Groups of one element in a block, and blocks worked on together: as the cache of a core holds."""
 _POINTS = 65_536
 _SPAN, _BITS = 1.4, 5
 
@@ -45,6 +45,8 @@ class FastField:
             points: In the network's frame; the closer those behind one another, the better.
         """
         found = points.new_zeros(len(points))
+        if len(points) == 0:
+            return found
         order = _by_place(points)
         for place in order.split(_POINTS):
             found[place] = self._together(shape, points.index_select(0, place))
@@ -52,20 +54,36 @@ class FastField:
 
     def _together(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
         """Return the field of one shape: elements that matter to a group are added to all of it."""
-        terms = _terms(points, -len(points) % _GROUP)
+        terms = _terms(points, -len(points) % _GROUP + _GROUP)
         most = (self.polynomial[shape] @ terms).unflatten(-1, (-1, _GROUP)).amax(-1)
         terms = terms.unflatten(-1, (-1, _GROUP))
         found = terms.new_zeros(terms.shape[1:])
+        element, group = _in_blocks(most[:, :-1] > 0)
         width = self.middle.shape[-2]
-        parts = (self.enter[shape], self.middle[shape], self.leave[shape], most > 0)
-        for enter, middle, leave, active in zip(*parts, strict=True):
-            for group in active.nonzero()[:, 0].split(_GROUPS):
-                first = enter @ terms.index_select(1, group).flatten(1)
-                second = (middle @ first[: width + 1].relu()).relu_()
-                value = torch.addmm(first[width + 1 : width + 2], leave, second)
-                value *= first[width + 2].exp_()
-                found.index_add_(0, group, value.view(-1, _GROUP), alpha=-NEGLIGIBLE)
+        parts = (self.enter[shape], self.middle[shape], self.leave[shape])
+        for number, near in zip(element.split(_BLOCKS), group.split(_BLOCKS * _ROWS), strict=True):
+            enter, middle, leave = (part.index_select(0, number) for part in parts)
+            place = terms.index_select(1, near).view(10, len(number), _ROWS * _GROUP)
+            first = enter @ place.transpose(0, 1)
+            second = (middle @ first[:, : width + 1].clamp_min(0)).clamp_min_(0)
+            value = (leave @ second).add_(first[:, width + 1 : width + 2])
+            value *= first[:, width + 2 :].exp_()
+            found.index_add_(0, near, value.view(-1, _GROUP), alpha=-NEGLIGIBLE)
         return found.flatten()[: len(points)]
+
+
+def _in_blocks(
+    active: Bool[Tensor, "elements groups"],
+) -> tuple[Int64[Tensor, " blocks"], Int64[Tensor, " rows"]]:
+    """Return the element of each block, and its groups: as many in all, a spare one fills up."""
+    element, group = active.nonzero().unbind(1)
+    count = active.sum(1)
+    blocks = (count + _ROWS - 1) // _ROWS
+    skipped = (blocks.cumsum(0) - blocks) * _ROWS - (count.cumsum(0) - count)
+    row = torch.arange(len(group), device=group.device) + skipped[element]
+    rows = group.new_full((int(blocks.sum()) * _ROWS,), active.shape[1])
+    rows[row] = group
+    return torch.arange(len(count), device=group.device).repeat_interleave(blocks), rows
 
 
 def _terms(points: Float[Tensor, "n 3"], more: int) -> Float[Tensor, "10 n_and_more"]:

@@ -16,7 +16,7 @@ _BOLDNESS = 5.0
 _CUBE = 0.7
 """Edge of the cubes in which points are gathered; 1 is that of squares as large as the triangles
 that are left."""
-_FLAT = 0.97
+_FLAT = 0.9
 """Share of the area of a surface that remains when it is seen from where most remains."""
 _ATTEMPTS = 10
 _MOST_TOUCHING = 200
@@ -61,22 +61,19 @@ def _gathered(points: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
     That is much quicker than to collapse edges, and leaves fewer of them to collapse. Points in
     cubes where the surface bends, or where gathering them makes sheets touch, stay as they are.
     """
-    first, second, third = points[faces.T]
-    normal = np.cross(second - first, third - first)
-    area = np.sqrt(np.einsum("ij,ij->i", normal, normal))
+    normal, area = _normals(points, faces)
     edge = _CUBE * float(np.sqrt(area.sum() / most))
     number = ((points - points.min(axis=0)) / edge).astype(np.int64)
     across = number.max(axis=0) + 1
     cube = (number[:, 0] * across[1] + number[:, 1]) * across[2] + number[:, 2]
-    _, cube = np.unique(cube, return_inverse=True)
     owner = cube[faces[:, 0]]
-    count = int(cube.max()) + 1
-    total = np.stack([np.bincount(owner, normal[:, axis], count) for axis in range(3)])
+    count = int(across.prod())
+    total = np.stack([np.bincount(owner, part, count) for part in normal])
     flat = np.sqrt((total**2).sum(axis=0)) > _FLAT * np.bincount(owner, area, count)
     place, few = np.arange(len(points)), faces
     for _ in range(_ATTEMPTS):
         place = np.where(flat[cube], cube, count + np.arange(len(points)))
-        few = place[faces]
+        few = place.take(faces)
         kept = (few[:, 0] != few[:, 1]) & (few[:, 1] != few[:, 2]) & (few[:, 2] != few[:, 0])
         few = _unfolded(few[kept])
         touching = _in_touching_edges(few)
@@ -84,10 +81,21 @@ def _gathered(points: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
         if len(touching) == 0:
             break
         flat[touching] = False
-    used, few = np.unique(few, return_inverse=True)
-    size = np.bincount(place)[used]
-    mean = np.stack([np.bincount(place, points[:, axis])[used] / size for axis in range(3)], axis=1)
-    return mean, few.reshape(-1, 3)
+    size = np.bincount(place)
+    mean = np.stack([np.bincount(place, part) for part in points.T], axis=1)
+    used = np.zeros(len(size), bool)
+    used[few] = True
+    return mean[used] / size[used, None], (np.cumsum(used) - 1).take(few)
+
+
+def _normals(
+    points: Points, faces: Faces
+) -> tuple[Float[np.ndarray, "3 faces"], Float[np.ndarray, " faces"]]:
+    """Return normals, as long as twice the areas, and these lengths."""
+    corners = np.ascontiguousarray(points.T).take(np.ascontiguousarray(faces.T), axis=1)
+    (x, y, z), (u, v, w) = (corners[:, k] - corners[:, 0] for k in (1, 2))
+    normal = np.stack((y * w - z * v, z * u - x * w, x * v - y * u))
+    return normal, np.sqrt((normal**2).sum(axis=0))
 
 
 def is_closed(faces: Int64[np.ndarray, "faces 3"]) -> bool:
