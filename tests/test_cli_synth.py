@@ -256,6 +256,20 @@ def test_export(chain: Chain, tmp_path: Path) -> None:
         assert (tmp_path / form / name).stat().st_size > 0
 
 
+@pytest.mark.parametrize("form", ["coco", "horizonnet", "crops"])
+def test_damaged_pictures_are_not_exported(chain: Chain, tmp_path: Path, form: str) -> None:
+    file = chain.again / "panoramas" / "home0000-1" / "rgb.jpg"
+    content = file.read_bytes()
+    try:
+        file.write_bytes(content[: len(content) // 2])
+        code, _, err = run("synth", "export", chain.again, form, tmp_path / form)
+    finally:
+        file.write_bytes(content)
+    assert code == 2
+    assert err == f"error: {file}: expected the file that was written, found another\n"
+    assert not (tmp_path / form).exists()
+
+
 def test_preview(chain: Chain, tmp_path: Path) -> None:
     code, _, err = run("synth", "preview", chain.data, "-o", tmp_path)
     assert code == 0, err

@@ -155,7 +155,8 @@ def check(folder: Folder, *, cache: Cache = None, json: Flag = False) -> int:
 
     Distances against the walls of the layout, masks against boxes, boxes against the points of
     the distance map, relations against what the boxes say, left and right, the seam, exposure,
-    hashes, splits, and that no two are alike. Exit code 1 if anything fails. For example:
+    hashes, splits, that no two are alike, and that homes differ. Exit code 1 if anything fails.
+    For example:
 
         panoscene synth check data
         panoscene synth check data --cache ~/.cache/panoscene/assets --json | jq .failures

@@ -14,7 +14,7 @@ from panoscene.models.shape import ShapeConfig, blob_centres
 from panoscene.scene import Layout, Relations
 
 from ._context_noise import OutputNoise
-from ._pose_samples import code_of, padded
+from ._pose_samples import CODE, code_of, padded
 
 RELATIONS = tuple(field.name for field in fields(Relations))
 """Names of the relations."""
@@ -22,7 +22,6 @@ AMONG_OBJECTS = ("touching", "farther_than", "relative_yaw")
 """Relations between two objects."""
 WITH_WALLS = ("touching_wall", "relative_yaw_wall")
 """Relations between an object and a wall."""
-_CODE = tuple(field.name for field in fields(BoxCode))
 _PLAIN = ("bfov", "category", "score", "appearance", "shape_code", "clues", "mean_size", "matched")
 
 
@@ -60,7 +59,7 @@ def collate_context(samples: Sequence[ContextSample]) -> dict[str, Tensor]:
     n = max(1, *(len(sample.category) for sample in samples))
     m = max(len(sample.layout.floor_polygon) for sample in samples)
     batch = {name: padded([getattr(s, name) for s in samples], n) for name in _PLAIN}
-    batch |= {name: padded([getattr(s.code, name) for s in samples], n) for name in _CODE}
+    batch |= {name: padded([getattr(s.code, name) for s in samples], n) for name in CODE}
     for field in fields(OutputNoise):
         parts = [getattr(sample.noise, field.name) for sample in samples]
         batch[f"noise_{field.name}"] = padded(parts, n)

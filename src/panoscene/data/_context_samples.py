@@ -1,7 +1,7 @@
 """Training samples of the relation graph network: what the first stages see, and the truth."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import torch
 from jaxtyping import Bool, Float, Int64
@@ -21,6 +21,7 @@ from ._pose_samples import (
     random_turn,
     turned_bfov,
     turned_boxes,
+    turned_layout,
 )
 
 _SOMEWHERE = (0.0, 2.0, 1.0)
@@ -134,7 +135,7 @@ def context_sample(
     turned_from_world = random_turn(generator)
     mirrored = int(torch.linalg.det(turned_from_world) < 0)
     chosen = _kept(_view(source, change, draw), mirrored, change, draw)
-    chosen = _turned(chosen, turned_from_world)
+    chosen = replace(chosen, bfov=turned_bfov(chosen.bfov, turned_from_world))
     strange = draw.whole(0, change.spurious + 1)
     if strange and len(sources) > 1:
         other = sources[(index + draw.whole(1, len(sources))) % len(sources)]
@@ -221,9 +222,7 @@ def _view(source: ContextScene, change: ContextAugmentation, draw: Draw) -> Enco
     if not unsure:
         return view
     score = draw.uniforms(len(view.score), 0.2, 1.0)
-    return EncodedObjects(
-        view.bfov, view.category, score, view.target, view.appearance, view.shape_code
-    )
+    return replace(view, score=score)
 
 
 def _kept(view: EncodedObjects, mirrored: int, change: ContextAugmentation, draw: Draw) -> _Chosen:
@@ -242,13 +241,11 @@ def _strangers(view: EncodedObjects, count: int, draw: Draw) -> _Chosen:
     index = torch.randperm(len(view.category), generator=draw.generator)[:count]
     chosen = _picked(view, index, draw.whole(0, 2))
     lon = draw.uniforms(len(index), -torch.pi, torch.pi)
-    return _Chosen(
+    return replace(
+        chosen,
         bfov=torch.cat([lon.unsqueeze(-1), chosen.bfov[:, 1:]], dim=-1),
-        category=chosen.category,
         score=chosen.score * draw.uniforms(len(index), 0.4, 1.0),
         target=torch.full_like(index, -1),
-        appearance=chosen.appearance,
-        shape_code=chosen.shape_code,
     )
 
 
@@ -272,17 +269,6 @@ def _with(first: _Chosen, second: _Chosen) -> _Chosen:
     )
 
 
-def _turned(chosen: _Chosen, matrix: Float[Tensor, "3 3"]) -> _Chosen:
-    return _Chosen(
-        turned_bfov(chosen.bfov, matrix),
-        chosen.category,
-        chosen.score,
-        chosen.target,
-        chosen.appearance,
-        chosen.shape_code,
-    )
-
-
 def _random_layout(
     source: ContextScene, matrix: Float[Tensor, "3 3"], change: ContextAugmentation, draw: Draw
 ) -> Layout:
@@ -291,10 +277,7 @@ def _random_layout(
     random = torch.randn(5, generator=draw.generator)
     scale, shift = 1 + random[:3] * change.wall, random[3:] * change.shift
     layout = source.scene.layout if true or estimated is None else estimated
-    corners = (layout.floor_polygon * scale[:2] + shift) @ matrix[:2, :2].T
-    if torch.linalg.det(matrix) < 0:
-        corners = corners.flip(0)
-    return Layout(corners, layout.floor_height, layout.ceiling_height * float(scale[2]))
+    return turned_layout(layout, matrix, scale, shift)
 
 
 def _boxes_or_any(truth: OrientedBoxes, target: Int64[Tensor, " n"]) -> OrientedBoxes:

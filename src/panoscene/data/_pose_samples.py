@@ -1,7 +1,7 @@
 """Training samples of the pose network: the crops of a scene with the codes of their boxes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from jaxtyping import Bool, Float, Int64
@@ -25,9 +25,8 @@ from ._photometric import augment_photo
 from ._pose_matches import match_detections
 from ._stage_records import StageRecord
 
-_CODE = (
-    "delta", "distance_bin", "distance_residual", "yaw_bin", "yaw_residual", "size_residual"
-)  # fmt: skip
+CODE = tuple(field.name for field in fields(BoxCode))
+"""Names of the parts of a code."""
 _NARROWEST, _WIDEST = 0.01, 3.1
 
 
@@ -203,7 +202,7 @@ def collate_pose(samples: Sequence[PoseSample]) -> dict[str, Tensor]:
     batch = {"crops": torch.cat([sample.crops for sample in samples])}
     for name in ("bfov", "category", "clues", "matched"):
         batch[name] = padded([getattr(sample, name) for sample in samples], longest)
-    for name in _CODE:
+    for name in CODE:
         batch[name] = padded([getattr(sample.code, name) for sample in samples], longest)
     count = torch.tensor([len(sample.category) for sample in samples])
     batch["valid"] = torch.arange(longest) < count.unsqueeze(-1)
@@ -216,7 +215,7 @@ def collate_pose(samples: Sequence[PoseSample]) -> dict[str, Tensor]:
 
 def code_of(batch: Mapping[str, Tensor]) -> BoxCode:
     """Return the code of a batch."""
-    return BoxCode(*(batch[name] for name in _CODE))
+    return BoxCode(*(batch[name] for name in CODE))
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,6 +272,20 @@ def turned_boxes(boxes: OrientedBoxes, matrix: Float[Tensor, "3 3"]) -> Oriented
     return OrientedBoxes(boxes.centre @ matrix.T, boxes.size, wrap_angle(flip * boxes.yaw - turn))
 
 
+def turned_layout(
+    layout: Layout,
+    matrix: Float[Tensor, "3 3"],
+    stretch: Float[Tensor, "3"],
+    shift: Float[Tensor, "2"] | None = None,
+) -> Layout:
+    """Return a room stretched and moved along the axes, then turned as the world was."""
+    corners = layout.floor_polygon * stretch[:2]
+    corners = (corners if shift is None else corners + shift) @ matrix[:2, :2].T
+    if torch.linalg.det(matrix) < 0:
+        corners = corners.flip(0)
+    return Layout(corners, layout.floor_height, layout.ceiling_height * float(stretch[2]))
+
+
 def jittered_bfov(
     bfov: Float[Tensor, "n 4"],
     change: PoseAugmentation,
@@ -297,10 +310,7 @@ def _random_layout(
     stretch = 1 + torch.randn(3, generator=generator) * change.wall
     if lucky:
         return None
-    corners = (layout.floor_polygon * stretch[:2]) @ matrix[:2, :2].T
-    if torch.linalg.det(matrix) < 0:
-        corners = corners.flip(0)
-    return Layout(corners, layout.floor_height, layout.ceiling_height * float(stretch[2]))
+    return turned_layout(layout, matrix, stretch)
 
 
 def padded(parts: Sequence[Tensor], length: int) -> Tensor:

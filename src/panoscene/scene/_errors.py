@@ -5,6 +5,8 @@ from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from typing import cast
 
+from panoscene._file_error import FileError
+
 MAX_LISTED = 10
 """How many problems an error message lists before it only counts the rest."""
 
@@ -47,22 +49,13 @@ class SceneFormatError(ValueError):
         return type(self), (self.file, self.problems)
 
 
-class PanoramaError(ValueError):
+class PanoramaError(FileError):
     """A picture cannot be used as an equirectangular panorama.
 
     Attributes:
         file: Name of the picture.
         reason: What was found and what was expected.
     """
-
-    def __init__(self, file: str | os.PathLike[str], reason: str) -> None:
-        self.file = os.fspath(file)
-        self.reason = reason
-        super().__init__(f"{self.file}: {reason}")
-
-    def __reduce__(self) -> tuple[type, tuple[str, str]]:
-        """Let worker processes hand the error on."""
-        return type(self), (self.file, self.reason)
 
 
 def shown(value: object, length: int = 60) -> str:

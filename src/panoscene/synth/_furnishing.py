@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 
 from panoscene.scene import CATEGORIES, MEAN_SIZE
 from panoscene.synth._floor_plan import FloorPlan
+from panoscene.synth._frames import place_of
 
 NOMINAL_SIZE: dict[str, tuple[float, float, float]] = {
     **dict(zip(CATEGORIES, MEAN_SIZE.double().tolist(), strict=True)),
@@ -42,8 +43,7 @@ class Piece:
 
     def place(self, right: float, front: float) -> Float[np.ndarray, " 2"]:
         """Return the point that lies so far to the piece's right and front of its centre."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        return self.centre[:2] + np.array([cos * right - sin * front, sin * right + cos * front])
+        return place_of(self.centre, self.yaw, right, front)
 
 
 class Furnishing:

@@ -3,6 +3,7 @@
 import json
 import math
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from PIL import Image
 from panoscene.geometry import boundary_from_layout
 from panoscene.scene import CATEGORIES
 from panoscene.synth.dataset import (
+    DatasetError,
     PanoramaItem,
     category_sheet,
     contact_sheet,
@@ -92,6 +94,29 @@ def test_crops_name_model_and_bfov(small_set: Path, tmp_path: Path):
     few = [json.loads(line) for file in fewer for line in file.read_text().splitlines()]
     assert 0 < len(few) < len(lines)
     assert all(line["occlusion"] == 0.0 for line in few)
+
+
+@pytest.mark.parametrize("export", [export_coco, export_horizonnet, export_crops])
+@pytest.mark.parametrize("name", ["rgb.jpg", "instance.png"])
+def test_damaged_pictures_are_not_exported(
+    small_set: Path,
+    tmp_path: Path,
+    export: Callable[[Path, Path], list[Path]],
+    name: str,
+):
+    root, out = tmp_path / "set", tmp_path / "out"
+    shutil.copytree(small_set, root)
+    file = open_dataset(root)[-1].folder / name
+    whole = file.read_bytes()
+    middle = len(whole) // 2
+    for damaged in (whole[:middle], whole[:middle] + b"\0" * 9 + whole[middle + 9 :], b""):
+        file.write_bytes(damaged)
+        with pytest.raises(DatasetError, match=f"{name}: expected the file that was written"):
+            export(root, out)
+    file.unlink()
+    with pytest.raises(DatasetError, match=f"{name}: expected a file of"):
+        export(root, out)
+    assert not out.exists()
 
 
 def test_statistics_count_what_is_there(small_set: Path):

@@ -74,8 +74,8 @@ def test_folders_that_are_not_shared_are_noticed(
     ray.exceptions = SimpleNamespace(RayTaskError=KeyError, RayError=LookupError)
     tasks, _ = begin_run(tmp_path / "set", recipe, cache, limit=None, extra=None, threads=1)
     copy_sample(tasks[0])
-    assert ray_module._result(ray, None, tasks[0]) is None
-    problem = ray_module._result(ray, None, tasks[1])
+    assert ray_module._problem(ray, None, tasks[0]) is None
+    problem = ray_module._problem(ray, None, tasks[1])
     assert problem is not None
     assert "home0001-0 is not in" in problem
     assert "must share that folder" in problem

@@ -21,6 +21,7 @@ from ._maps import DISTANCE, INSTANCE, LABELS, MILLIMETRES, SEMANTIC, read_map, 
 from ._picture_checks import check_alignment, check_exposure, check_seam
 from ._point_checks import check_masks, check_points
 from ._read import PanoramaItem, SynthDataset, open_dataset
+from ._variety import variety_problems
 from ._write import file_hash, scene_text
 
 CHECKS: Mapping[str, Callable[[Loaded], list[str]]] = MappingProxyType(
@@ -37,7 +38,7 @@ CHECKS: Mapping[str, Callable[[Loaded], list[str]]] = MappingProxyType(
     }
 )
 """Checks of one panorama, by the keys of ``check_dataset``."""
-SET_CHECKS = ("files", "hashes", "splits", "distinct")
+SET_CHECKS = ("files", "hashes", "splits", "distinct", "variety")
 """Keys of the checks of files and of the set as a whole."""
 _LISTED = 200
 
@@ -67,6 +68,7 @@ def check_dataset(
     - alignment: colours change where the instances change
     - splits: homes are in one part only, and unseen models only in test-unseen
     - distinct: no two panoramas have the same labels
+    - variety: of ten homes and more, no statistic of ``dataset_statistics`` is the same in all
 
     Args:
         root: Folder of the set.
@@ -202,4 +204,9 @@ def _set_problems(dataset: SynthDataset) -> dict[str, list[str]]:
     for entry in entries:
         parts.setdefault(entry.home, set()).add(entry.split)
     torn = [f"{home} is in {' and '.join(sorted(s))}" for home, s in parts.items() if len(s) > 1]
-    return {"distinct": same, "files": found, "splits": torn}
+    return {
+        "distinct": same,
+        "files": found,
+        "splits": torn,
+        "variety": variety_problems(dataset),
+    }

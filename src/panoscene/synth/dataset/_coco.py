@@ -13,6 +13,7 @@ from ._format import SPLITS, ObjectLabel, Split
 from ._maps import INSTANCE, read_map
 from ._read import PanoramaItem, SynthDataset, open_dataset
 from ._run_lengths import encode_mask
+from ._sound import sound_items
 
 
 def export_coco(root: Path | str, out: Path | str) -> list[Path]:
@@ -33,11 +34,12 @@ def export_coco(root: Path | str, out: Path | str) -> list[Path]:
         DatasetError: A file of the set is missing or damaged.
     """
     dataset = open_dataset(root)
+    everything = sound_items(dataset)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for split in SPLITS:
-        items = [item for item in dataset if item.split == split]
+        items = [item for item in everything if item.split == split]
         if items:
             path = folder / f"instances_{split}.json"
             write_atomically(path, json.dumps(_document(dataset, split, items)))

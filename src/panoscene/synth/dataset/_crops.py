@@ -7,6 +7,7 @@ from panoscene.scene import write_atomically
 
 from ._format import SPLITS
 from ._read import open_dataset
+from ._sound import sound_items
 
 
 def export_crops(root: Path | str, out: Path | str, *, most_hidden: float = 0.5) -> list[Path]:
@@ -26,12 +27,13 @@ def export_crops(root: Path | str, out: Path | str, *, most_hidden: float = 0.5)
         DatasetError: A file of the set is missing or damaged.
     """
     dataset = open_dataset(root)
+    items = sound_items(dataset)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for split in SPLITS:
         lines = []
-        for item in dataset:
+        for item in items:
             if item.split != split:
                 continue
             upright = item.scene().panorama.upright_from_photo

@@ -13,6 +13,7 @@ from panoscene.scene import Scene, write_atomically
 from ._format import SPLITS
 from ._maps import jpeg_bytes
 from ._read import PanoramaItem, open_dataset
+from ._sound import sound_items
 
 
 def horizonnet_corners(scene: Scene) -> Float64[np.ndarray, "twice_corners 2"]:
@@ -57,11 +58,11 @@ def export_horizonnet(root: Path | str, out: Path | str) -> list[Path]:
     Raises:
         DatasetError: A file of the set is missing or damaged.
     """
-    dataset = open_dataset(root)
+    items = sound_items(open_dataset(root))
     return [
         _export_item(item, Path(out) / split)
         for split in SPLITS
-        for item in dataset
+        for item in items
         if item.split == split
     ]
 

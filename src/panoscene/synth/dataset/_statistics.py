@@ -35,7 +35,7 @@ def dataset_statistics(root: Path | str) -> dict[str, Any]:
         DatasetError: A file of the set is missing or damaged.
     """
     dataset = open_dataset(root)
-    tally = _Tally()
+    tally = Tally()
     for item in dataset:
         tally.add(item.scene(), item.labels(), item.split)
     return {
@@ -46,7 +46,9 @@ def dataset_statistics(root: Path | str) -> dict[str, Any]:
     }
 
 
-class _Tally:
+class Tally:
+    """Counts over panoramas, one after the other."""
+
     def __init__(self) -> None:
         self.categories: Counter[str] = Counter()
         self.splits: Counter[str] = Counter()
@@ -61,6 +63,7 @@ class _Tally:
         self.pairs = Counter[str]()
 
     def add(self, scene: Scene, labels: PanoramaLabels, split: str) -> None:
+        """Count a panorama."""
         layout = scene.layout
         self.splits[split] += 1
         self.homes[split].add(labels.home)
@@ -72,14 +75,14 @@ class _Tally:
             self.categories[label.category] += 1
             self.models[label.category].add(label.model)
             self.bases[split].add(label.base)
-            self.note("occlusion", label.occlusion)
-            self.note("object_distance", float(np.linalg.norm(_from_eye(label.box.centre, scene))))
-        self.note("visible_objects", len(kept))
-        self.note("left_out", len(labels.objects) - len(kept))
-        self.note("room_area", float(polygon_area(layout.floor_polygon)))
-        self.note("ceiling_height", layout.ceiling_height)
-        self.note("camera_height", scene.panorama.camera_height)
-        self.note("tilt_deg", float(np.degrees(np.arccos(
+            self._note("occlusion", label.occlusion)
+            self._note("object_distance", float(np.linalg.norm(_from_eye(label.box.centre, scene))))
+        self._note("visible_objects", len(kept))
+        self._note("left_out", len(labels.objects) - len(kept))
+        self._note("room_area", float(polygon_area(layout.floor_polygon)))
+        self._note("ceiling_height", layout.ceiling_height)
+        self._note("camera_height", scene.panorama.camera_height)
+        self._note("tilt_deg", float(np.degrees(np.arccos(
             np.clip(scene.panorama.upright_from_photo[2][2], -1.0, 1.0)))))  # fmt: skip
         self._add_relations(scene, labels)
 
@@ -99,10 +102,11 @@ class _Tally:
         self.pairs["contacts"] += len(labels.contacts)
         self.pairs["close"] += sum(contact.gap <= 0.1 for contact in labels.contacts)
 
-    def note(self, name: str, value: float | int) -> None:
+    def _note(self, name: str, value: float | int) -> None:
         self.lists.setdefault(name, []).append(float(value))
 
     def result(self) -> dict[str, Any]:
+        """Return the statistics of what was counted, as ``dataset_statistics`` has them."""
         total = max(sum(self.splits.values()), 1)
         objects = max(sum(self.categories.values()), 1)
         occlusion = np.array(self.lists.get("occlusion", []))

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from panoscene.synth._frames import place_of
+
 from ._manhattan import blocks_around, walls_of
 from ._paths import FloorGrid
 from ._records import Opening, Room
@@ -56,8 +58,7 @@ class Piece:
 
     def place(self, right: float, front: float) -> Float[np.ndarray, " 2"]:
         """Return the point that lies so far to the piece's right and front of its centre."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        return self.centre[:2] + np.array([cos * right - sin * front, sin * right + cos * front])
+        return place_of(self.centre, self.yaw, right, front)
 
 
 class Space:

@@ -1,18 +1,16 @@
 """Renders what is left of a data set on the computers of a Ray cluster."""
 
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
+from contextlib import closing
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from panoscene._ray import ray_cluster, ray_package, ray_result, spread
 from panoscene.synth.dataset import Recipe
 
 from ._photographs import Extra
 from ._run import RenderProgress, RenderTask, Told, begin_run, follow, render_home
-
-_AGAIN = 3
-"""Times that a home is tried again when its computer goes away."""
 
 
 def render_with_ray(
@@ -51,18 +49,12 @@ def render_with_ray(
         ModuleNotFoundError: The optional package ray is missing.
         ConnectionError: There is no cluster at the address.
     """
-    ray = _ray()
+    ray = ray_package()
     tasks, progress = begin_run(root, recipe, cache, limit=limit, extra=extra, threads=1)
     if not tasks:
         return follow(Path(root), iter(()), progress, told)
-    started = not ray.is_initialized()
-    if started:
-        _connect(ray, address)
-    try:
-        return follow(Path(root), _finished(ray, tasks, render), progress, told)
-    finally:
-        if started:
-            ray.shutdown()
+    with ray_cluster(ray, address), closing(_finished(ray, tasks, render)) as finished:
+        return follow(Path(root), finished, progress, told)
 
 
 def outcome(render: Callable[[RenderTask], None], task: RenderTask) -> str | None:
@@ -76,50 +68,20 @@ def outcome(render: Callable[[RenderTask], None], task: RenderTask) -> str | Non
     return None
 
 
-def _ray() -> ModuleType:
-    # it reports how it is used to its makers unless told otherwise
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    try:
-        import ray  # noqa: PLC0415 - optional
-    except ModuleNotFoundError as error:
-        hint = "rendering on several computers needs ray: pip install 'panoscene[ray]'"
-        raise ModuleNotFoundError(hint, name="ray") from error
-    return ray
-
-
-def _connect(ray: ModuleType, address: str | None) -> None:
-    try:
-        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-    except ConnectionError as error:
-        raise ConnectionError(f"{address}: found no Ray cluster there") from error
-
-
 def _finished(
     ray: ModuleType, tasks: list[RenderTask], render: Callable[[RenderTask], None]
-) -> Iterator[tuple[RenderTask, str | None]]:
+) -> Generator[tuple[RenderTask, str | None], None, None]:
     """Return tasks as they finish, with the reason of those that failed."""
-    remote: Any = ray.remote(outcome).options(
-        num_cpus=1, max_retries=_AGAIN, scheduling_strategy="SPREAD"
-    )
-    given = ray.put(render)
-    running = {remote.remote(given, task): task for task in tasks}
-    try:
-        while running:
-            done, _ = ray.wait(list(running), num_returns=1)
-            task = running.pop(done[0])
-            yield task, _result(ray, done[0], task)
-    finally:
-        for reference in running:
-            ray.cancel(reference, force=True)
+    for task, reference in spread(ray, outcome, (render,), tasks):
+        yield task, _problem(ray, reference, task)
 
 
-def _result(ray: ModuleType, reference: Any, task: RenderTask) -> str | None:
+def _problem(ray: ModuleType, reference: Any, task: RenderTask) -> str | None:
+    """Return why a home could not be made, or None when it was."""
     try:
-        problem = ray.get(reference)
-    except ray.exceptions.RayTaskError as error:
-        if error.cause is None:
-            raise
-        raise error.cause from None
+        problem = ray_result(ray, reference)
+    except ray.exceptions.RayTaskError:
+        raise
     except ray.exceptions.RayError as error:
         return f"the computer that rendered it went away: {' '.join(str(error).split())}"
     missing = [c.name for c in task.job.cameras if not _is_here(task.root, c.name)]

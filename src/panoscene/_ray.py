@@ -12,17 +12,11 @@ _AGAIN = 3
 _Task = TypeVar("_Task")
 
 
-@contextmanager
-def ray_cluster(address: str | None) -> Iterator[ModuleType]:
-    """Give the package, connected to a cluster.
-
-    Args:
-        address: such as ``auto`` or ``ray://head:10001``; None takes the one that is running here,
-            or else the cores of this computer.
+def ray_package() -> ModuleType:
+    """Return the optional package.
 
     Raises:
-        ModuleNotFoundError: The optional package ray is missing.
-        ConnectionError: There is no cluster at the address.
+        ModuleNotFoundError: It is missing.
     """
     # it reports how it is used to its makers unless told otherwise
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -31,6 +25,21 @@ def ray_cluster(address: str | None) -> Iterator[ModuleType]:
     except ModuleNotFoundError as error:
         hint = "working on several computers needs ray: pip install 'panoscene[ray]'"
         raise ModuleNotFoundError(hint, name="ray") from error
+    return ray
+
+
+@contextmanager
+def ray_cluster(ray: ModuleType, address: str | None) -> Iterator[None]:
+    """Connect the package to a cluster; one that it is connected to already stays.
+
+    Args:
+        ray: the package.
+        address: such as ``auto`` or ``ray://head:10001``; None takes the one that is running here,
+            or else the cores of this computer.
+
+    Raises:
+        ConnectionError: There is no cluster at the address.
+    """
     started = not ray.is_initialized()
     if started:
         try:
@@ -38,7 +47,7 @@ def ray_cluster(address: str | None) -> Iterator[ModuleType]:
         except ConnectionError as error:
             raise ConnectionError(f"{address}: found no Ray cluster there") from error
     try:
-        yield ray
+        yield
     finally:
         if started:
             ray.shutdown()
@@ -47,13 +56,11 @@ def ray_cluster(address: str | None) -> Iterator[ModuleType]:
 def spread(
     ray: ModuleType, work: Callable[..., Any], given: Sequence[Any], tasks: Sequence[_Task]
 ) -> Iterator[tuple[_Task, Any]]:
-    """Return tasks as they finish, with what came of them: one core each.
-
-    Whatever goes wrong on another computer comes back as an exception of this one.
+    """Return tasks as they finish, with where ``ray_result`` finds what came of them.
 
     Args:
         ray: the package, connected to a cluster.
-        work: a function of what is given and a task.
+        work: a function of what is given and a task; it gets one core.
         given: the same for all tasks.
         tasks: what is to be done, each different.
     """
@@ -64,14 +71,20 @@ def spread(
     try:
         while running:
             done, _ = ray.wait(list(running), num_returns=1)
-            task = running.pop(done[0])
-            yield task, _result(ray, done[0])
+            yield running.pop(done[0]), done[0]
     finally:
         for reference in running:
             ray.cancel(reference, force=True)
 
 
-def _result(ray: ModuleType, reference: Any) -> Any:
+def ray_result(ray: ModuleType, reference: Any) -> Any:
+    """Return what came of a task.
+
+    Whatever its function raised on another computer is raised here, too.
+
+    Raises:
+        RayError: Its computer went away, too many times.
+    """
     try:
         return ray.get(reference)
     except ray.exceptions.RayTaskError as error:
