@@ -6,9 +6,10 @@
     python benchmarks/detector.py /work/pilot --split test-seen test-unseen --seams circular \
         --output benchmarks/detector-test.json
 
-Writes benchmarks/detector.json: COCO's AP of masks and boxes, also of each category, recall of
-BFoVs, recall of the objects across the seam, seconds. The weights are the same for all ways; they
-were trained with the first one. Pictures of photos and of panoramas of the set go to a folder.
+Writes benchmarks/detector.json: COCO's AP of masks and boxes, recall of BFoVs (both also of each
+category), recall of the objects across the seam, seconds. The weights are the same for all ways;
+they were trained with the first one, so this does not compare trainings. Pictures of photos and of
+panoramas of the set go to a folder. The card is written from that file.
 """
 
 import argparse
@@ -16,7 +17,7 @@ import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import torch
@@ -36,6 +37,7 @@ from panoscene.synth.dataset import PanoramaItem, open_dataset
 from panoscene.train._detector_card import detector_card
 from panoscene.train._detector_eval import evaluate_detector
 from panoscene.train._detector_pictures import detector_picture
+from panoscene.train._precompute_estimates import file_hash
 
 OUTPUT = Path(__file__).with_suffix(".json")
 DOUBTFUL = 0.02
@@ -60,15 +62,16 @@ def main() -> None:
     items = [x for split in options.split for x in open_dataset(options.data, split)]
     items = items[: options.count]
     weights = options.weights or shipped_weights("detector")
-    if options.card:
-        header = read_weights_header(weights)
-        count = len(open_dataset(options.data, "train"))
-        text = detector_card(header.metrics, header.recipe, panoramas=count)
-        write_atomically(options.card, text)
     if options.pictures:
         draw(weights, items, options.photos, options.pictures)
-    if not options.seams or not items:
-        return
+    if options.seams and items:
+        measure(options, weights, items)
+    if options.card:
+        write_card(options.card, weights, json.loads(options.output.read_text()), options.data)
+
+
+def measure(options: argparse.Namespace, weights: Path, items: Sequence[PanoramaItem]) -> None:
+    """Write the scores of each way to see the seam and print the most important ones."""
     result = {
         "scores": {
             seam: evaluate_detector(stage_of(weights, seam), items, roll=options.roll)
@@ -78,12 +81,24 @@ def main() -> None:
         "panoramas": len(items),
         "roll": options.roll,
         "set": open_dataset(options.data).info.name,
+        "weights": file_hash(weights),
         "machine": machine_facts(),
     }
     write_atomically(options.output, json.dumps(result, indent=2) + "\n")
     for seam, scores in result["scores"].items():
         shown = {k: round(v, 3) for k, v in scores.items() if "/" not in k}
         print(seam, shown, flush=True)
+
+
+def write_card(card: Path, weights: Path, measured: dict[str, Any], data: Path) -> None:
+    """Write the model card from scores on the part val, with the seam as it was trained."""
+    header = read_weights_header(weights)
+    wanted = ("val", file_hash(weights))
+    if (measured["split"], measured.get("weights")) != wanted:
+        raise SystemExit("the scores are of another part or of other weights: measure val first")
+    scores = measured["scores"][header.config["seam"]]
+    count = len(open_dataset(data, "train"))
+    write_atomically(card, detector_card(scores, header.recipe, panoramas=count))
 
 
 def stage_of(weights: Path, seam: Seam) -> DetectorStage:

@@ -1,5 +1,6 @@
 """Backbones: shapes, strides, the seam, and weights from elsewhere."""
 
+import random
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +185,33 @@ def test_files_that_hold_no_tensors(tmp_path: Path) -> None:
         read_tensors(file)
     torch.save({"model": {"a": torch.ones(1)}}, file)
     assert list(read_tensors(file)) == ["a"]
-    torch.save({"epoch": 3}, file)
-    with pytest.raises(CheckpointError, match="something else"):
-        read_tensors(file)
+    for content in ({"epoch": 3}, {3: torch.ones(1)}):
+        torch.save(content, file)
+        with pytest.raises(CheckpointError, match="something else"):
+            read_tensors(file)
+
+
+def test_junk_is_named_and_nothing_of_the_unpickler_is_shown(tmp_path: Path) -> None:
+    # texts, opcodes of pickle in any order, damaged files of both formats
+    file = tmp_path / "junk.pth"
+    chance = random.Random(0)  # noqa: S311 (not for secrets)
+    sound: list[bytes] = []
+    told: set[str] = set()
+    for modern in (True, False):
+        torch.save({"a": torch.ones(3)}, file, _use_new_zipfile_serialization=modern)
+        sound.append(file.read_bytes())
+    for k in range(200):
+        junk = bytearray(chance.choice(b"eval true (lambda)\nc. }q\x00") for _ in range(40))
+        if k % 4 == 0:
+            junk[:2] = b"\x80\x02"
+        elif k % 4 < 3:
+            junk = bytearray(sound[k % 4 - 1])
+            for _ in range(3):
+                junk[chance.randrange(len(junk))] = chance.randrange(256)
+        file.write_bytes(junk)
+        try:
+            read_tensors(file)
+        except CheckpointError as error:
+            told.add(str(error))
+    assert all(text.startswith(f"{file}: found ") for text in told)
+    assert not any("PyTorch" in text for text in told)

@@ -1,6 +1,8 @@
 """Files with weights: what is written comes back, and anything else is refused by name."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -16,6 +18,19 @@ from panoscene.models import (
     shipped_weights,
     write_weights,
 )
+from panoscene.models.context import load_context_stage
+from panoscene.models.detector import load_detector_stage
+from panoscene.models.layout import load_layout_stage
+from panoscene.models.pose import load_pose_stage
+from panoscene.models.shape import load_shape_stage
+
+LOADERS = {
+    "detector": load_detector_stage,
+    "layout": load_layout_stage,
+    "pose": load_pose_stage,
+    "shape": load_shape_stage,
+    "context": load_context_stage,
+}
 
 HEADER = WeightsHeader(
     stage="layout", edition="compact", config={"width": 4}, metrics={"iou": 0.5}, seed=3
@@ -124,3 +139,19 @@ def test_a_flipped_bit(tmp_path: Path) -> None:
 def test_unknown_stages_ship_no_weights() -> None:
     with pytest.raises(CheckpointError, match=r"kitchen-compact\.safetensors: found no such file"):
         shipped_weights("kitchen")
+
+
+@pytest.mark.parametrize(("stage", "load"), LOADERS.items())
+def test_what_a_file_says_of_its_network_is_checked_by_all_stages(
+    tmp_path: Path, stage: str, load: Callable[..., Any]
+) -> None:
+    file = tmp_path / "w.safetensors"
+    header = HEADER.model_copy(update={"stage": stage, "config": {"kitchen": 3}})
+    write_weights(file, network(), header)
+    message = r"w\.safetensors: found a configuration with faults in .*kitchen|and \d+ more"
+    with pytest.raises(CheckpointError, match=message):
+        load("compact", file)
+    with pytest.raises(CheckpointError, match=f"weights of the compact {stage}, expected"):
+        load("paper", file)
+    with pytest.raises(CheckpointError, match=f"{stage}-paper.*none come with the paper edition"):
+        load("paper")

@@ -8,7 +8,7 @@ import torch
 from panoscene.data._detector_truth import SeenObjects, seen_objects
 from panoscene.geometry import bfov_from_mask
 from panoscene.models.detector import CONFIGS, RegionPredictions, detections_of
-from panoscene.scene import Detections
+from panoscene.scene import CATEGORIES, Detections
 from panoscene.synth.dataset import open_dataset
 from panoscene.train import TrainError, TrainRecipe, read_train_recipe
 from panoscene.train._detector import DetectorOptions, DetectorTask, detector_task
@@ -55,6 +55,25 @@ def test_ground_truth_scores_one() -> None:
     scores = detector_scores([found], [seen])
     assert {scores[k] for k in ("mask_ap", "mask_ap50", "box_ap", "box_ap50")} == {1.0}
     assert {scores[k] for k in ("bfov_recall", "bfov_recall_sure", "bfov_recall_any")} == {1.0}
+    assert {scores[f"bfov_recall/{CATEGORIES[c]}"] for c in found.category.tolist()} == {1.0}
+
+
+def test_recall_and_objects_of_each_category() -> None:
+    # of two chairs one is found; the bed is taken for a chair; a table is ignored
+    mask = torch.zeros(4, 32, 64, dtype=torch.bool)
+    for k in range(4):
+        mask[k, 12:20, 16 * k + 2 : 16 * k + 10] = True
+    chair, bed, table = (CATEGORIES.index(name) for name in ("chair", "bed", "table"))
+    category = torch.tensor([chair, chair, bed, table])
+    ignored = torch.tensor([False, False, False, True])
+    bfov = bfov_from_mask(mask)
+    found = Detections(bfov[[0, 2]], category[[0, 1]], torch.tensor([0.9, 0.2]), mask[[0, 2]])
+    scores = detector_scores([found], [SeenObjects(mask, bfov, category, ignored)])
+    by_category = {k: v for k, v in scores.items() if k.startswith(("bfov_recall/", "objects/"))}
+    assert by_category == {
+        "bfov_recall/chair": 0.5, "objects/chair": 2.0, "bfov_recall/bed": 0.0, "objects/bed": 1.0,
+    }  # fmt: skip
+    assert scores["bfov_recall"] == pytest.approx(1 / 3)
 
 
 def test_wrong_categories_and_nothing_score_zero() -> None:
@@ -155,10 +174,17 @@ def test_a_recipe_without_data_is_refused() -> None:
         detector_task(recipe)
 
 
-def test_the_card_tells_scores_and_limits(tmp_path: Path) -> None:
-    metrics = {"mask_ap50": 0.25, "box_ap50": 0.3, "mask_ap50/chair": 0.5, "mask_ap50/bed": 0.125}
-    card = detector_card(metrics, {"steps": 700, "batch_size": 1}, panoramas=265)
+def test_the_card_tells_scores_and_limits() -> None:
+    metrics = {
+        "mask_ap50": 0.25, "box_ap50": 0.3,
+        "mask_ap50/chair": 0.5, "box_ap50/chair": 0.625, "bfov_recall/chair": 0.75,
+        "objects/chair": 12.0, "mask_ap50/bed": 0.125,
+    }  # fmt: skip
+    recipe = {"steps": 700, "batch_size": 1}
+    card = detector_card(metrics, recipe, panoramas=265)
     assert "| mask AP50 | 25.0 |" in card
-    assert card.index("| chair | 50.0 |") < card.index("| bed | 12.5 |")
+    rows = "| chair | 12 | 50.0 | 62.5 | 75.0 |\n| bed |  | 12.5 |  |  |"
+    assert rows in card
     assert "265 panoramas" in card
-    assert not list(tmp_path.iterdir())
+    assert "earlier trainings" not in card
+    assert "earlier trainings" in detector_card(metrics, {**recipe, "start": "a"}, panoramas=1)

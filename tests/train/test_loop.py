@@ -175,6 +175,21 @@ def test_another_recipe_needs_another_folder(
     assert train(tiny_recipe(steps=4, workers=1), tmp_path, tiny_task).steps == 4
 
 
+def test_another_data_set_needs_another_folder(
+    tmp_path: Path, tiny_recipe: Recipes, tiny_task: Build
+) -> None:
+    for name, index in (("one", "{}"), ("moved", "{}"), ("other", '{"homes": 3}')):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "dataset.json").write_text(index)
+    run = tmp_path / "run"
+    train(tiny_recipe(steps=2, data=tmp_path / "one"), run, tiny_task)
+    before = {file: file.read_bytes() for file in run.iterdir() if file.is_file()}
+    with pytest.raises(TrainError, match=r"run: found a training on the data set .*one.*other"):
+        train(tiny_recipe(steps=4, data=tmp_path / "other"), run, tiny_task)
+    assert {file: file.read_bytes() for file in run.iterdir() if file.is_file()} == before
+    assert train(tiny_recipe(steps=4, data=tmp_path / "moved"), run, tiny_task).steps == 4
+
+
 def test_a_damaged_checkpoint_is_named(
     tmp_path: Path, tiny_recipe: Recipes, tiny_task: Build
 ) -> None:

@@ -7,6 +7,7 @@ import pytest
 import torch
 import trimesh
 
+from panoscene.models import CheckpointError, WeightsHeader, content_hash, write_weights
 from panoscene.models.shape import CONFIGS
 from panoscene.synth.assets import CadModel, Material, add_models
 from panoscene.train import TrainError, TrainRecipe, read_train_recipe
@@ -153,6 +154,31 @@ def test_a_recipe_without_data_is_refused(tmp_path: Path) -> None:
         options={"folder": str(tmp_path)},
     )  # fmt: skip
     with pytest.raises(TrainError, match="data: found none"):
+        shape_task(recipe)
+
+
+def test_it_starts_from_the_weights_of_a_file(
+    task: ShapeTask, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("panoscene.train._shape.CONFIGS", {"compact": TINY})
+    file = tmp_path / "start.safetensors"
+    header = WeightsHeader(stage="shape", edition="compact")
+    with torch.no_grad():
+        for parameter in task.model.parameters():
+            parameter.mul_(0.5)
+    write_weights(file, task.model, header, half=False)
+    options = {"folder": str(folder / "data"), "assets": str(folder / "assets"), "frozen_views": 1}
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=1, learning_rate=1.0,
+        data=SAMPLES, start=file, imagenet=True, options=options,
+    )  # fmt: skip
+    known = set((folder / "data").glob("seen-*"))
+    started = shape_task(recipe)
+    assert content_hash(started.model.state_dict()) == content_hash(task.model.state_dict())
+    # what another backbone saw is not taken for what this one sees
+    assert len(set((folder / "data").glob("seen-*")) - known) == 1
+    write_weights(file, task.model, header.model_copy(update={"stage": "pose"}))
+    with pytest.raises(CheckpointError, match="weights of the compact pose"):
         shape_task(recipe)
 
 

@@ -1,6 +1,7 @@
 """Start weights trained on ImageNet, converted to timm's names."""
 
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -40,11 +41,10 @@ def imagenet_weights(name: str, file: Path | None = None) -> dict[str, Tensor]:
     if missing:
         found = f"no tensor {missing[0]} ({len(missing)} missing)"
         raise CheckpointError(source, found, f"the ImageNet weights of {name}")
-    for key, tensor in wanted.items():
-        if key in given and given[key].shape != tensor.shape:
-            found = f"{key} of shape {tuple(given[key].shape)}"
-            raise CheckpointError(source, found, f"{tuple(tensor.shape)}, as in {name}")
-    return {key: given[key] for key in wanted if key in given}
+    taken = {key: given[key] for key in wanted if key in given}
+    for key, tensor in taken.items():
+        check_tensor(source, key, tensor, wanted[key], of=name)
+    return taken
 
 
 def read_tensors(file: Path) -> dict[str, Tensor]:
@@ -56,6 +56,7 @@ def read_tensors(file: Path) -> dict[str, Tensor]:
         CheckpointError: The file is missing, or is not a table of tensors.
     """
     import pickle  # noqa: PLC0415 (for its error only)
+    import struct  # noqa: PLC0415 (likewise)
 
     from safetensors import SafetensorError  # noqa: PLC0415
     from safetensors.torch import load_file  # noqa: PLC0415
@@ -64,20 +65,53 @@ def read_tensors(file: Path) -> dict[str, Tensor]:
     try:
         if file.suffix == ".safetensors":
             return load_file(file)
-        document = torch.load(file, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings(action="ignore", category=UserWarning):  # of pickle protocols
+            document = torch.load(file, map_location="cpu", weights_only=True)
     except OSError as error:
-        raise CheckpointError(file, f"no readable file ({error.strerror})", expected) from None
-    except (SafetensorError, pickle.UnpicklingError, RuntimeError, EOFError) as error:
-        found = " ".join(str(error).split())[:120]
+        reason = error.strerror or " ".join(str(error).split())
+        raise CheckpointError(file, f"no readable file ({reason})", expected) from None
+    except SafetensorError as error:
+        raise CheckpointError(file, " ".join(str(error).split()), expected) from None
+    except (
+        pickle.UnpicklingError, struct.error, RuntimeError, EOFError, LookupError, ValueError,
+        TypeError, AttributeError, AssertionError, OverflowError, MemoryError,
+    ):  # fmt: skip
+        # the unpickler trusts what it reads: junk makes it stumble in any of these ways, and what
+        # it says then is about its own works
+        found = "a damaged file, or one that holds more than tensors"
         raise CheckpointError(file, found, expected) from None
     for key in ("model", "state_dict"):
         if isinstance(document, Mapping) and isinstance(document.get(key), Mapping):
             document = document[key]
     if not isinstance(document, Mapping) or not all(
-        isinstance(tensor, Tensor) for tensor in document.values()
+        isinstance(name, str) and isinstance(tensor, Tensor) for name, tensor in document.items()
     ):
         raise CheckpointError(file, "something else", expected)
     return dict(document)
+
+
+def check_tensor(file: Path, name: str, tensor: Tensor, wanted: Tensor, *, of: str) -> None:
+    """Refuse a tensor that cannot take the place of another.
+
+    Args:
+        file: It comes from.
+        name: Of the tensor.
+        tensor: From the file.
+        wanted: What the network has; only its shape and type count.
+        of: The network, for the message.
+
+    Raises:
+        CheckpointError: Shape or kind of number differ, or a value is not finite.
+    """
+    if tensor.shape != wanted.shape:
+        found, expected = f"shape {tuple(tensor.shape)}", f"{tuple(wanted.shape)}"
+    elif tensor.is_floating_point() != wanted.is_floating_point():
+        found, expected = f"type {tensor.dtype}", f"{wanted.dtype}"
+    elif tensor.is_floating_point() and not bool(tensor.isfinite().all()):
+        found, expected = "values that are not finite", "numbers"
+    else:
+        return
+    raise CheckpointError(file, f"{name} with {found}", f"{expected}, as in {of}")
 
 
 def _renamed(

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -20,6 +20,7 @@ SCHEMA = 1
 _KEY, _HASH = "panoscene", "sha256"
 _LISTED = 3
 _FOLDER = Path(__file__).parent / "weights"
+Config = TypeVar("Config", bound=BaseModel)
 
 
 class WeightsHeader(BaseModel):
@@ -89,9 +90,7 @@ def read_weights(path: Path, module: nn.Module, *, stage: str, edition: Edition)
         CheckpointError: The file is missing, damaged, or for another network.
     """
     header, tensors, digest = _read(path)
-    if (header.stage, header.edition) != (stage, edition):
-        found = f"weights of the {header.edition} {header.stage}"
-        raise CheckpointError(path, found, f"those of the {edition} {stage}")
+    _check_purpose(path, header, stage, edition)
     wanted = module.state_dict()
     _check_names(path, tensors, wanted)
     for name, tensor in wanted.items():
@@ -111,6 +110,31 @@ def read_weights_header(path: Path) -> WeightsHeader:
         CheckpointError: The file is missing, or is no file with weights.
     """
     return _read(path)[0]
+
+
+def config_of(path: Path, default: Config, *, stage: str, edition: Edition) -> Config:
+    """Return what the network in a file with weights was built from.
+
+    Args:
+        path: Written by ``write_weights``.
+        default: Of the edition: returned where the file says nothing.
+        stage: What the file must be for.
+        edition: Likewise.
+
+    Raises:
+        CheckpointError: The file is missing, damaged, for another network, or says what no
+            network of the stage can be built from.
+    """
+    header = read_weights_header(path)
+    _check_purpose(path, header, stage, edition)
+    if not header.config:
+        return default
+    try:
+        return type(default).model_validate(header.config)
+    except ValidationError as error:
+        names = [".".join(map(str, fault["loc"])) or "all" for fault in error.errors()]
+        found = f"a configuration with faults in {_listed(names)}"
+        raise CheckpointError(path, found, f"that of the {edition} {stage}") from None
 
 
 def shipped_weights(stage: str) -> Path:
@@ -188,6 +212,12 @@ def _read(path: Path) -> tuple[WeightsHeader, dict[str, Tensor], str]:
         return WeightsHeader.model_validate(document), tensors, metadata.get(_HASH, "")
     except (ValidationError, json.JSONDecodeError) as error:
         raise CheckpointError(path, " ".join(str(error).split())[:200], expected) from None
+
+
+def _check_purpose(path: Path, header: WeightsHeader, stage: str, edition: Edition) -> None:
+    if (header.stage, header.edition) != (stage, edition):
+        found = f"weights of the {header.edition} {header.stage}"
+        raise CheckpointError(path, found, f"those of the {edition} {stage}")
 
 
 def _check_names(path: Path, given: Mapping[str, Tensor], wanted: Mapping[str, Tensor]) -> None:

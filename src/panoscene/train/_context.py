@@ -39,6 +39,7 @@ from panoscene.models.context import (
 )
 from panoscene.models.pose import PoseNetwork, load_pose_stage, pose_losses
 from panoscene.models.shape import CONFIGS as SHAPE_CONFIGS
+from panoscene.pipeline import PHOTO
 from panoscene.synth.dataset import open_dataset
 
 from ._context_arrange import arranged_losses, arrangement_batch
@@ -93,8 +94,9 @@ class ContextOptions(BaseModel):
     """Step ``joint``: factor of the pose network's own losses."""
     box_losses: bool = True
     """Step ``joint``: whether corners, BFoVs and walls count as in the authors' release."""
-    arrange_preset: str = "default"
-    """Step ``joint``: settings of the arrangement."""
+    arrange_preset: Literal["photo", "default", "released", "paper"] = "photo"
+    """Step ``joint``: settings of the unrolled arrangement; ``photo`` are those of the pipeline,
+    with which every step is validated."""
     arrange_steps: int = 10
     """Step ``joint``: of the unrolled arrangement."""
 
@@ -147,7 +149,8 @@ class ContextTask(Task):
         self.joint = options.step == "joint"
         self.pose.requires_grad_(requires_grad=self.joint)
         self.model = JointNetwork(self.network, self.pose) if self.joint else self.network
-        self.settings: ArrangementSettings = PRESETS[options.arrange_preset].model_copy(
+        presets: Mapping[str, ArrangementSettings] = {**PRESETS, PHOTO.name: PHOTO}
+        self.settings = presets[options.arrange_preset].model_copy(
             update={"steps": options.arrange_steps, "safe": False}
         )
 
@@ -213,7 +216,7 @@ class ContextTask(Task):
             first = with_rule(seen.initial(self._said, self.shape_config))
             rows = {"": scenes, "initial_": first}
             if self.options.step != "pose":
-                rows |= {"arranged_": arranged(scenes, "default")}
+                rows |= {"arranged_": arranged(scenes, PHOTO)}
             for row, predicted in rows.items():
                 scores = box_scores(predicted, seen.truth)
                 if row == "initial_" or (self.options.step != "pose" and not row):

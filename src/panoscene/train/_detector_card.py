@@ -14,7 +14,11 @@ _SCORES = {
     "bfov_recall_sure": "BFoV recall, score 0.3 or more",
     "bfov_recall_any": "BFoV recall, any category",
 }
-_OF_CATEGORY = "mask_ap50/"
+_OF_CATEGORY = {
+    "mask_ap50": "mask AP50",
+    "box_ap50": "box AP50",
+    "bfov_recall": "BFoV recall",
+}
 
 
 def detector_card(
@@ -23,8 +27,8 @@ def detector_card(
     """Return the model card of a trained compact detector.
 
     Args:
-        metrics: Of its validation, as in the header of its weights.
-        recipe: It was trained with, as in the same place.
+        metrics: On the part ``val``, as ``detector_scores`` names them.
+        recipe: It was trained with, as in the header of its weights.
         panoramas: How many it was trained on.
 
     Examples:
@@ -36,19 +40,10 @@ def detector_card(
     scores = [
         f"| {name} | {100 * metrics[key]:.1f} |" for key, name in _SCORES.items() if key in metrics
     ]
-    by_category = {
-        key.removeprefix(_OF_CATEGORY): value
-        for key, value in metrics.items()
-        if key.startswith(_OF_CATEGORY)
-    }
-    rows = [
-        f"| {words(name)} | {100 * value:.1f} |"
-        for name, value in sorted(by_category.items(), key=lambda pair: (-pair[1], pair[0]))
-    ]
     earlier = (
         [
-            "- It went on from weights of an earlier, shorter training, which are not published: "
-            "recipe and seed alone do not give these weights."
+            "- It went on from weights of earlier trainings, which are not published and of which "
+            "configs/compact/detector.yaml tells: recipe and seed alone do not give these weights."
         ]
         if recipe.get("start")
         else []
@@ -82,11 +77,11 @@ def detector_card(
             "| --- | --- |",
             *scores,
             "",
-            "## Mask AP50 of each category",
+            "## Scores of each category",
             "",
-            "| category | % |",
-            "| --- | --- |",
-            *rows,
+            "Percent. Of one or two objects a score says little.",
+            "",
+            *_category_table(metrics),
             "",
             "## Limits",
             "",
@@ -98,3 +93,21 @@ def detector_card(
             "",
         )
     )
+
+
+def _category_table(metrics: Mapping[str, float]) -> list[str]:
+    """Return a row for each category that has a mask AP50, best first."""
+    first = next(iter(_OF_CATEGORY))
+    there = [key.partition("/")[2] for key in metrics if key.startswith(f"{first}/")]
+    there.sort(key=lambda name: (-metrics[f"{first}/{name}"], name))
+    lines = [
+        f"| category | objects | {' | '.join(_OF_CATEGORY.values())} |",
+        f"| --- | ---: |{' ---: |' * len(_OF_CATEGORY)}",
+    ]
+    for name in there:
+        shares = [metrics.get(f"{key}/{name}") for key in _OF_CATEGORY]
+        cells = ["" if share is None else f"{100 * share:.1f}" for share in shares]
+        count = metrics.get(f"objects/{name}")
+        number = "" if count is None else f"{count:.0f}"
+        lines.append(f"| {words(name)} | {number} | {' | '.join(cells)} |")
+    return lines

@@ -22,13 +22,14 @@ _SURE = 0.3
 
 
 def detector_scores(found: Sequence[Detections], truth: Sequence[SeenObjects]) -> dict[str, float]:
-    """Return scores by name over panoramas; all are in [0, 1].
+    """Return scores by name over panoramas; all but the counts are in [0, 1].
 
     ``mask_ap``, ``mask_ap50``, ``box_ap``, ``box_ap50`` are COCO's, means over the categories
     that are there; ``mask_ap50/chair`` and so on are those of a category. ``bfov_recall`` is the
     share of objects that a detection of their category covers with an overlap of 0.5 on the
     sphere; ``bfov_recall_sure`` counts detections with a score of 0.3 or more,
-    ``bfov_recall_any`` those of any category.
+    ``bfov_recall_any`` those of any category. ``bfov_recall/chair`` and so on are those of a
+    category, ``objects/chair`` how many there are of it.
 
     Args:
         found: Detections with masks, in the size of the truth's.
@@ -50,10 +51,17 @@ def _recall(found: Sequence[Detections], truth: Sequence[SeenObjects]) -> dict[s
         hits["_any"].append(overlap.any(1))
         hits[""].append((overlap & same).any(1))
         hits["_sure"].append((overlap & same & (one.score >= _SURE)).any(1))
-    return {
-        f"bfov_recall{name}": float(torch.cat(values).float().mean()) if values else 0.0
-        for name, values in hits.items()
+    every = {name: torch.cat(values) for name, values in hits.items()}
+    scores = {
+        f"bfov_recall{name}": float(values.float().mean()) if len(values) else 0.0
+        for name, values in every.items()
     }
+    category = torch.cat([seen.category[~seen.ignored] for seen in truth])
+    for c in category.unique().tolist():
+        own = every[""][category == c]
+        scores[f"bfov_recall/{CATEGORIES[c]}"] = float(own.float().mean())
+        scores[f"objects/{CATEGORIES[c]}"] = float(len(own))
+    return scores
 
 
 def _average_precision(

@@ -21,17 +21,19 @@ def begin_run(run: Path, recipe: TrainRecipe, environment: dict[str, Any]) -> No
     """Make the folder of a run, or check that it is the folder of this recipe.
 
     Raises:
-        TrainError: The folder belongs to another recipe, or holds something else.
+        TrainError: The folder belongs to another recipe or data set, or holds something else.
     """
     if run.exists() and not run.is_dir():
         raise TrainError(run, "found a file, expected a folder")
     run.mkdir(parents=True, exist_ok=True)
     started = (run / LAST).is_file()
-    if started:
-        _check_same(run, recipe)
-    write_atomically(run / RECIPE, recipe_text(recipe))
     file = run / ENVIRONMENT
     starts = json.loads(file.read_text())["starts"] if started and file.is_file() else []
+    if started:
+        _check_same(run, recipe)
+    if starts:
+        _check_same_data(run, starts[-1], environment)
+    write_atomically(run / RECIPE, recipe_text(recipe))
     write_atomically(file, json.dumps({"starts": [*starts, environment]}, indent=2) + "\n")
 
 
@@ -42,3 +44,13 @@ def _check_same(run: Path, recipe: TrainRecipe) -> None:
     if changed:
         listed = "; ".join(f"{name} {before[name]!r}, now {now[name]!r}" for name in changed)
         raise TrainError(run, f"found a training of another recipe ({listed}): take a new folder")
+
+
+def _check_same_data(run: Path, before: dict[str, Any], now: dict[str, Any]) -> None:
+    """Refuse another data set: best weights of one would be compared with scores on the other."""
+    if before["data_hash"] != now["data_hash"]:
+        raise TrainError(
+            run,
+            f"found a training on the data set {before['data']}, whose dataset.json was another "
+            f"than that of {now['data']} is now: take a new folder",
+        )

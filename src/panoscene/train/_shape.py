@@ -31,6 +31,7 @@ from panoscene.data._shape_samples import (
     write_seen_views,
 )
 from panoscene.data._shape_store import ModelShape
+from panoscene.models import content_hash, read_weights
 from panoscene.models.shape import (
     CONFIGS,
     ISO_LEVEL,
@@ -104,8 +105,10 @@ class ShapeTask(Task):
         self.entries = self._entries()
         self.weights = ShapeWeights(near=self.options.near_weight)
         self.model: ShapeNetwork = build_shape(  # pyright: ignore[reportIncompatibleVariableOverride]
-            self.network_config, imagenet=recipe.imagenet
+            self.network_config, imagenet=recipe.imagenet and recipe.start is None
         )
+        if recipe.start is not None:
+            read_weights(recipe.start, self.model, stage="shape", edition=recipe.edition)
         self.views: SeenViews | None = None
         if self.options.frozen_views:
             self.views = self._seen_views()
@@ -144,7 +147,8 @@ class ShapeTask(Task):
         """Return what the backbone sees in all pictures; what a file has is not made again."""
         count, rows = self.options.frozen_views, self.network_config.crop
         keys = [f"{name} {crop} of {count}" for crop, name in self.entries]
-        file = self.options.folder / f"seen-{self.network_config.backbone}-{rows}.safetensors"
+        backbone = content_hash(self.model.encoder.backbone.state_dict())[:12]
+        file = self.options.folder / f"seen-{backbone}-{rows}.safetensors"
         known = read_seen_views(file) if file.is_file() else None
         there = frozenset() if known is None else frozenset(known.names)
         missing = [k for k, key in enumerate(keys) if key not in there]

@@ -4,6 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -28,7 +29,7 @@ def shape_scores(
     points: int = 2000,
     resolution: int = 64,
     seed: int = 0,
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Return mean errors in canonical space, by kind of object and method, and by category.
 
     Kinds: ``crops`` are objects of validation panoramas, whose models were trained on; ``unseen``
@@ -44,7 +45,7 @@ def shape_scores(
         seed: Of all samples.
     """
     generator = torch.Generator().manual_seed(seed)
-    result: dict[str, object] = {}
+    result: dict[str, Any] = {}
     for kind, everything in task.validation().items():
         chosen = everything
         if limit is not None and len(everything) > limit:
@@ -113,8 +114,8 @@ def _errors(
 
 def _by_category(
     found: dict[str, list[ShapeErrors]], categories: list[str]
-) -> dict[str, dict[str, dict[str, float]]]:
-    result: dict[str, dict[str, dict[str, float]]] = {}
+) -> dict[str, dict[str, dict[str, float | None]]]:
+    result: dict[str, dict[str, dict[str, float | None]]] = {}
     for category in sorted(set(categories)):
         mine = [k for k, name in enumerate(categories) if name == category]
         result[category] = {
@@ -124,12 +125,16 @@ def _by_category(
     return result
 
 
-def _mean(errors: Iterable[ShapeErrors]) -> dict[str, float]:
-    """Return means; shapes that were missed are left out of the Chamfer distance."""
+def _mean(errors: Iterable[ShapeErrors]) -> dict[str, float | None]:
+    """Return means, None where nothing has a value.
+
+    Shapes that were missed are left out of the Chamfer distance, and surfaces that do not close
+    out of the overlap of volumes.
+    """
     chosen = list(errors)
-    result: dict[str, float] = {}
+    result: dict[str, float | None] = {}
     for name in _NAMES:
         values = [getattr(one, name) for one in chosen]
         kept = [value for value in values if value is not None and np.isfinite(value)]
-        result[name] = float(np.mean(kept)) if kept else float("nan")
+        result[name] = float(np.mean(kept)) if kept else None
     return result

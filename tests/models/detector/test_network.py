@@ -82,6 +82,18 @@ def test_coco_weights_go_where_they_belong(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("value", "message"), [(torch.nan, "not finite"), (7, r"type torch\.int64")]
+)
+def test_coco_weights_are_finite_numbers(tmp_path: Path, value: float, message: str) -> None:
+    file = tmp_path / "coco.pth"
+    odd = "roi_heads.mask_head.mask_fcn1.0.weight.more"
+    tensors = {"backbone.body.conv1.weight": torch.full((64, 3, 7, 7), value), odd: torch.ones(1)}
+    torch.save(tensors, file)
+    with pytest.raises(CheckpointError, match=f"conv1.weight.*{message}"):
+        load_coco_weights(_paper(), file)
+
+
 @pytest.mark.parametrize("name", ["tf_efficientnet_lite0", "resnet18"])
 def test_folded_norms_change_nothing(name: str) -> None:
     generator = torch.Generator().manual_seed(0)

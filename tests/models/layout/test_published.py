@@ -105,7 +105,9 @@ def test_code_in_a_file_is_not_run(network: LayoutNetwork, tmp_path: Path) -> No
     assert victim.exists()
 
 
-@pytest.mark.parametrize("fault", ["missing", "unknown", "shape", "no tensors", "no file"])
+@pytest.mark.parametrize(
+    "fault", ["missing", "unknown", "shape", "not finite", "whole", "no tensors", "no file"]
+)
 def test_wrong_files_are_refused(
     published: dict[str, Tensor], network: LayoutNetwork, tmp_path: Path, fault: str
 ) -> None:
@@ -117,6 +119,10 @@ def test_wrong_files_are_refused(
         content = published | {"decoder.weight": torch.zeros(1)}
     elif fault == "shape":
         content = published | {"linear.bias": torch.zeros(3)}
+    elif fault == "not finite":
+        content = published | {"linear.weight": published["linear.weight"] / 0}
+    elif fault == "whole":
+        content = published | {"linear.bias": published["linear.bias"].long()}
     elif fault == "no tensors":
         content = {"state_dict": {"linear.bias": 3}}
     if fault != "no file":

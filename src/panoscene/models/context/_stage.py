@@ -5,10 +5,10 @@ from pathlib import Path
 import torch
 
 from panoscene.models._editions import Edition
-from panoscene.models._weights import read_weights, read_weights_header, weights_file
+from panoscene.models._weights import config_of, read_weights, weights_file
 from panoscene.scene import Objects, Relations
 
-from ._config import CONFIGS, ContextConfig
+from ._config import CONFIGS
 from ._estimates import Estimates
 from ._network import ContextNetwork, build_context
 from ._relations import ContextOutput
@@ -72,8 +72,6 @@ def load_context_stage(
         CheckpointError: There are no weights, or they are for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    stored = read_weights_header(path).config
-    config = ContextConfig.model_validate(stored) if stored else CONFIGS[edition]
-    network = build_context(config)
+    network = build_context(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
     read_weights(path, network, stage=STAGE, edition=edition)
     return ContextStage(network.to(device))

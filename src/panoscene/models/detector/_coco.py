@@ -1,11 +1,12 @@
 """Start weights from torchvision's Mask R-CNN, trained on COCO."""
 
+import re
 from pathlib import Path
 
 from torch import Tensor, nn
 
 from panoscene.models._errors import CheckpointError
-from panoscene.models._imagenet import read_tensors
+from panoscene.models._imagenet import check_tensor, read_tensors
 
 from ._network import DetectorNetwork
 
@@ -38,9 +39,7 @@ def load_coco_weights(network: DetectorNetwork, file: Path) -> None:
         if name not in given:
             expected = "torchvision's maskrcnn_resnet50_fpn, for the paper's edition"
             raise CheckpointError(file, f"no tensor {name}", expected)
-        if given[name].shape != tensor.shape:
-            found = f"{name} of shape {tuple(given[name].shape)}"
-            raise CheckpointError(file, found, f"{tuple(tensor.shape)}")
+        check_tensor(file, name, given[name], tensor, of="torchvision's maskrcnn_resnet50_fpn")
         taken[name] = given[name]
     network.load_state_dict(taken, strict=False)
     for layer in network.modules():
@@ -59,7 +58,7 @@ def _our_name(name: str) -> str:
             return f"{start}{parts[0]}.0.{parts[1]}"
     old = {"rpn.head.conv.weight": "rpn.head.conv.0.0.weight"}
     old["rpn.head.conv.bias"] = "rpn.head.conv.0.0.bias"
-    if name.startswith("roi_heads.mask_head.mask_fcn"):
-        layer, kind = name.removeprefix("roi_heads.mask_head.mask_fcn").split(".")
-        return f"roi_heads.mask_head.{int(layer) - 1}.0.{kind}"
+    layer = re.fullmatch(r"roi_heads\.mask_head\.mask_fcn(\d+)\.(weight|bias)", name)
+    if layer:
+        return f"roi_heads.mask_head.{int(layer[1]) - 1}.0.{layer[2]}"
     return old.get(name, name)

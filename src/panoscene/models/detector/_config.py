@@ -79,8 +79,8 @@ CONFIGS: dict[Edition, DetectorConfig] = {
         anchors=tuple(_anchors(size) for size in (32.0, 64.0, 128.0, 256.0, 512.0)),
     ),
     # latitudes from 50.6 degrees above to 69.4 degrees below the horizon: in the training split
-    # 97 % of the objects lie wholly in there. Anchors: all but 6 % of these objects overlap one
-    # by more than half; each level has the same shapes, for one head judges them all
+    # 97 % of the objects lie wholly in there. Anchors: all but 6 % of the objects overlap one by
+    # more than half; each level has the same shapes, for one head judges them all
     "compact": DetectorConfig(
         backbone="tf_efficientnet_lite0",
         width=768,

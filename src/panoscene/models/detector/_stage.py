@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from panoscene.models._editions import Edition
-from panoscene.models._weights import read_weights, read_weights_header, shipped_weights
+from panoscene.models._weights import config_of, read_weights, weights_file
 from panoscene.scene import Detections
 
 from ._config import CONFIGS, DetectorConfig
@@ -17,6 +17,8 @@ from ._paste import paste_masks
 from ._targets import RegionPredictions
 from ._window import network_picture
 
+STAGE = "detector"
+"""Name of this stage in files with weights."""
 _LEAST_PIXELS = 4
 
 
@@ -102,13 +104,9 @@ def load_detector_stage(
     Raises:
         CheckpointError: The file is missing or for another network.
     """
-    path = weights or shipped_weights("detector")
-    header = read_weights_header(path)
-    config = CONFIGS[edition]
-    if header.stage == "detector" and header.edition == edition and header.config:
-        config = DetectorConfig.model_validate(header.config)
-    network = build_detector(config)
-    read_weights(path, network, stage="detector", edition=edition)
+    path = weights_file(STAGE, edition, weights)
+    network = build_detector(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
+    read_weights(path, network, stage=STAGE, edition=edition)
     return DetectorStage(
         network.to(device), score_threshold=score_threshold, mask_height=mask_height
     )

@@ -16,11 +16,11 @@ from jaxtyping import Float, Int
 from panoscene.models.layout._columns import RoomColumns
 from panoscene.models.layout._walls import (
     Evidence,
+    Rooms,
     Walls,
     column_costs,
-    corners_of,
     evidence_of,
-    room_costs,
+    rooms_of,
     seen_walls,
 )
 
@@ -32,6 +32,8 @@ FIRST_PRICE = 4.0
 """Of a change of wall in the first room; less than a corner's, for walls are taken out later."""
 MOST_WALLS = 20
 """Of the first room."""
+BEHIND = 1e-2
+"""Camera heights at which a column is taken to see a wall that is behind it: it fits nowhere."""
 GAP = math.radians(2.0)
 """Jump of latitude from which a change of wall hides something."""
 TRIED = 3
@@ -153,9 +155,9 @@ def first_places(
     axis, place = _candidates(evidence, axes)
     if not len(place):
         return None
-    facing = evidence.ray @ axes.T
-    distance = place[:, None] / _nonzero(facing[:, axis].T)
-    cost = column_costs(np.where(distance > 0, distance, 1e-2), evidence)
+    facing = _nonzero(evidence.ray @ axes.T).T
+    distance = place[:, None] / facing[axis]
+    cost = column_costs(np.where(distance > 0, distance, BEHIND), evidence)
     price = FIRST_PRICE
     while True:
         states = _cheapest_ring(cost, evidence, price)
@@ -180,12 +182,15 @@ def _candidates(
 ) -> tuple[Int[np.ndarray, " states"], Float[np.ndarray, " states"]]:
     """Return axis and place of the walls that many columns see."""
     grid = 0.1 * RATIO ** np.arange(math.ceil(math.log(160) / math.log(RATIO)))
-    facing = evidence.ray @ axes.T
     axis = np.repeat([0, 0, 1, 1], len(grid))
     place = np.concatenate((grid, -grid, grid, -grid))
-    distance = place[:, None] / _nonzero(facing[:, axis].T)
-    cost = column_costs(np.where(distance > 0, distance, 1e-2), evidence)
-    support = np.maximum(0.0, 2.0 - cost).sum(1).reshape(4, -1)
+    facing = _nonzero(evidence.ray @ axes.T).T
+    # a column sees the wall on one side only: both sides share the costs in front of the camera
+    ahead = column_costs(grid[:, None] / np.abs(facing[:, None]), evidence)
+    behind = column_costs(np.full(len(evidence.ray), BEHIND), evidence)
+    near = np.stack((facing, -facing), axis=1) > 0
+    cost = np.where(near[:, :, None], ahead[:, None], behind)
+    support = np.maximum(0.0, 2.0 - cost).sum(-1).reshape(4, -1)
     padded = np.pad(support, ((0, 0), (2, 2)))
     around = np.stack([padded[:, shift : shift + len(grid)] for shift in range(5)])
     peak = (support >= around.max(0)) & (support > 2.0)
@@ -247,20 +252,23 @@ def _thinned(
 ) -> list[Fit]:
     """Return the room and what is left of it as walls are taken out, two at a time."""
     fits: list[Fit] = []
-    place = _settled(place, axes, evidence)[0]
+    room = _settled(rooms_of(place[None], axes, evidence), axes, evidence)
     while True:
-        misfit, price = room_costs(place[None], axes, evidence)[:, 0].tolist()
-        if math.isfinite(misfit):
-            fits.append(Fit(Walls(axes, place), misfit, price))
+        if math.isfinite(room.misfit[0]):
+            fits.append(_fit(room, axes))
+        place = room.place[0]
         if len(place) <= 4:
             return fits
-        fewer = np.stack([_without(place, k) for k in range(len(place))])
-        order = np.argsort(room_costs(fewer, axes, evidence).sum(0))
-        tried = [
-            _settled(fewer[k], axes, evidence, rounds=1 if len(place) > MANY else 3)
-            for k in order[: 1 if len(place) > MANY else TRIED].tolist()
-        ]
-        place = min(tried, key=lambda found: found[1])[0]
+        many = len(place) > MANY
+        places = np.stack([_without(place, k) for k in range(len(place))])
+        fewer = rooms_of(places, axes, evidence)
+        tried = fewer.chosen(np.argsort(fewer.cost)[: 1 if many else TRIED])
+        tried = _settled(tried, axes, evidence, rounds=1 if many else 3)
+        room = tried.chosen(tried.cost.argmin(keepdims=True))
+
+
+def _fit(room: Rooms, axes: Float[np.ndarray, "2 2"], noise: float = 1.0) -> Fit:
+    return Fit(Walls(axes, room.place[0]), float(room.misfit[0]), float(room.price[0]), noise)
 
 
 def _without(place: Float[np.ndarray, " walls"], k: int) -> Float[np.ndarray, " fewer"]:
@@ -273,52 +281,49 @@ def _without(place: Float[np.ndarray, " walls"], k: int) -> Float[np.ndarray, " 
 
 
 def _settled(
-    place: Float[np.ndarray, " walls"],
-    axes: Float[np.ndarray, "2 2"],
-    evidence: Evidence,
-    *,
-    rounds: int = 3,
-) -> tuple[Float[np.ndarray, " walls"], float]:
-    """Return the room with each wall moved to a weighted median of its columns, and its cost."""
-    best, least = place, float(room_costs(place[None], axes, evidence).sum())
-    facing = evidence.ray @ axes.T
+    rooms: Rooms, axes: Float[np.ndarray, "2 2"], evidence: Evidence, *, rounds: int = 3
+) -> Rooms:
+    """Return the rooms with each wall moved to a weighted median of its columns, if that helps."""
+    best, here = rooms, rooms
+    moving = np.ones(len(rooms.place), dtype=np.bool_)
     for _ in range(rounds):
-        _, wall = seen_walls(corners_of(place[None], axes), evidence.ray)
-        across = facing[np.arange(len(evidence.ray)), wall[0] % 2]
-        implied = across * evidence.distance
-        # change of latitude with the wall's place
-        weight = np.abs(across) / (1 + evidence.distance**2)
-        moved = place.copy()
-        for k in range(len(place)):
-            mine = wall[0] == k
-            if mine.any():
-                moved[k] = _median(implied[mine], weight[mine])
-        cost = float(room_costs(moved[None], axes, evidence).sum())
-        if cost < least:
-            best, least = moved, cost
-        if np.allclose(moved, place, atol=1e-3):
+        moved = rooms_of(_moved(here, axes, evidence), axes, evidence)
+        best = best.where(moving & (moved.cost < best.cost), moved)
+        moving &= ~np.isclose(moved.place, here.place, atol=1e-3).all(1)
+        if not moving.any():
             break
-        place = moved
-    return best, least
+        here = moved
+    return best
+
+
+def _moved(
+    rooms: Rooms, axes: Float[np.ndarray, "2 2"], evidence: Evidence
+) -> Float[np.ndarray, "rooms walls"]:
+    """Return where most of the columns that see a wall want it: their weighted median."""
+    facing = evidence.ray @ axes.T
+    across = np.where(rooms.wall % 2 == 0, facing[:, 0], facing[:, 1])
+    implied = across * evidence.distance
+    # change of latitude with the wall's place
+    weight = np.abs(across) / (1 + evidence.distance**2)
+    order = implied.argsort(1)
+    implied, weight, wall = (
+        np.take_along_axis(values, order, 1) for values in (implied, weight, rooms.wall)
+    )
+    mine = wall[:, None, :] == np.arange(rooms.place.shape[1])[:, None]
+    total = np.where(mine, weight[:, None, :], 0.0).cumsum(2)
+    median = (mine & (total >= total[:, :, -1:] / 2)).argmax(2)
+    return np.where(mine.any(2), np.take_along_axis(implied, median, 1), rooms.place)
 
 
 def _turned(fit: Fit, evidence: Evidence) -> Fit:
     """Return the room turned a little where that fits better."""
     for turn in TURNS:
-        cos, sin = math.cos(turn), math.sin(turn)
-        axes = fit.walls.axes @ np.array([[cos, sin], [-sin, cos]])
-        place = _settled(fit.walls.place, axes, evidence)[0]
-        misfit, price = room_costs(place[None], axes, evidence)[:, 0].tolist()
-        turned = Fit(Walls(axes, place), misfit, price, fit.noise)
+        axes = fit.walls.axes @ axes_of(turn)
+        room = rooms_of(fit.walls.place[None], axes, evidence)
+        turned = _fit(_settled(room, axes, evidence), axes, fit.noise)
         if turned.cost < fit.cost:
             fit = turned
     return fit
-
-
-def _median(values: Float[np.ndarray, " n"], weights: Float[np.ndarray, " n"]) -> float:
-    order = np.argsort(values)
-    total = weights[order].cumsum()
-    return float(values[order][int((total < total[-1] / 2).sum())])
 
 
 def _nonzero(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from panoscene.models._errors import CheckpointError
-from panoscene.models._imagenet import read_tensors
+from panoscene.models._imagenet import check_tensor, read_tensors
 from panoscene.models.layout._network import LayoutNetwork
 
 _RULES = (
@@ -44,9 +44,7 @@ def read_published_layout(path: Path, network: LayoutNetwork) -> None:
         found = f"{unknown[0]} and {len(unknown) - 1} more" if unknown[1:] else unknown[0]
         raise CheckpointError(path, found, "only tensors that the network has")
     for name, tensor in given.items():
-        if tensor.shape != wanted[name].shape:
-            found = f"{name} of shape {tuple(tensor.shape)}"
-            raise CheckpointError(path, found, f"{tuple(wanted[name].shape)}")
+        check_tensor(path, name, tensor, wanted[name], of="HorizonNet")
     for name in ("head.weight", "head.bias"):
         given[name] = _upwards(given[name], network.columns)
     network.load_state_dict({**wanted, **given})

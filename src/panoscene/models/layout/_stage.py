@@ -6,17 +6,17 @@ from pathlib import Path
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float
-from pydantic import ValidationError
 from torch import Tensor
 
 from panoscene.models._editions import Edition
-from panoscene.models._errors import CheckpointError
-from panoscene.models._weights import read_weights, read_weights_header, shipped_weights
-from panoscene.models.layout._config import CONFIGS, LayoutConfig
+from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.models.layout._config import CONFIGS
 from panoscene.models.layout._network import LayoutNetwork, build_layout
 from panoscene.models.layout._room import room_from_signals
 from panoscene.scene import Layout
 
+STAGE = "layout"
+"""Name of this stage in files with weights."""
 PUBLISHED_COLUMNS = 4
 """Columns of a step in HorizonNet. Where a step gives more, they are off in a pattern that repeats
 from step to step, and the boundary is smoothed over one step."""
@@ -118,20 +118,9 @@ def load_layout_stage(
     Raises:
         CheckpointError: There are no such weights, or they are for another network.
     """
-    if weights is None:
-        if edition != "compact":
-            raise CheckpointError(
-                "layout", f"no weights of the {edition} edition", "the file of some to be named"
-            )
-        weights = shipped_weights("layout")
-    stored = read_weights_header(weights).config
-    try:
-        config = LayoutConfig.model_validate(stored) if stored else CONFIGS[edition]
-    except ValidationError as error:
-        found = f"a configuration with {error.error_count()} faults"
-        raise CheckpointError(weights, found, "that of a layout network") from None
-    network = build_layout(config)
-    read_weights(weights, network, stage="layout", edition=edition)
+    path = weights_file(STAGE, edition, weights)
+    network = build_layout(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
+    read_weights(path, network, stage=STAGE, edition=edition)
     network.to(device)
     if device == "cpu":
         network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]

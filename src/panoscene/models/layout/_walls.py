@@ -109,14 +109,17 @@ def seen_walls(
 
     Corner k ends wall k. Where no wall is met the distance is ``FAR_AWAY``.
     """
-    end = corners[:, :, None, :]
-    start = np.roll(end, 1, axis=1)
-    side_start = ray[:, 0] * start[..., 1] - ray[:, 1] * start[..., 0]
-    side_end = ray[:, 0] * end[..., 1] - ray[:, 1] * end[..., 0]
-    met = (side_start <= 0) != (side_end <= 0)
-    area = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
-    distance = area / np.where(met, side_end - side_start, 1.0)
-    distance = np.where(met & (distance > 1e-6), distance, FAR_AWAY)
+    x, y = corners[..., 0], corners[..., 1]
+    side = ray[:, 0] * y[..., None] - ray[:, 1] * x[..., None]
+    right = side > 0
+    # few rays meet a wall: only those are divided
+    met = np.nonzero(right != np.roll(right, 1, axis=1))
+    room, end, column = met
+    start = end - 1
+    area = x[room, start] * y[room, end] - y[room, start] * x[room, end]
+    there = area / (side[met] - side[room, start, column])
+    distance = np.full(side.shape, FAR_AWAY)
+    distance[met] = np.where(there > 1e-6, there, FAR_AWAY)
     wall = distance.argmin(1)
     return np.take_along_axis(distance, wall[:, None], 1)[:, 0], wall
 
@@ -130,16 +133,44 @@ def column_costs(
     return (np.minimum(floor, MOST) + np.minimum(ceiling, MOST)) / (2 * NOISE)
 
 
-def room_costs(
-    places: Float[np.ndarray, "rooms walls"], axes: Float[np.ndarray, "2 2"], evidence: Evidence
-) -> Float[np.ndarray, "2 rooms"]:
-    """Return what rooms cost: the misfit of the columns, and the price of corners.
+@dataclass(frozen=True, slots=True)
+class Rooms:
+    """Manhattan rooms of the same axes and number of walls, and what they cost."""
 
-    A room that the camera is not inside has an infinite misfit. The price includes corners that
-    the network saw and the room has not.
-    """
+    place: Float[np.ndarray, "rooms walls"]
+    wall: Int[np.ndarray, "rooms columns"]
+    """Which wall each column sees."""
+    misfit: Float[np.ndarray, " rooms"]
+    """Of the columns; infinite for a room that the camera is not inside."""
+    price: Float[np.ndarray, " rooms"]
+    """Of the corners, and of those that the network saw and the room has not."""
+
+    @property
+    def cost(self) -> Float[np.ndarray, " rooms"]:
+        """Misfit and price."""
+        return self.misfit + self.price
+
+    def chosen(self, which: Int[np.ndarray, " chosen"]) -> "Rooms":
+        """Return some of the rooms."""
+        return Rooms(self.place[which], self.wall[which], self.misfit[which], self.price[which])
+
+    def where(self, better: Bool[np.ndarray, " rooms"], other: "Rooms") -> "Rooms":
+        """Return these rooms, and the others in place of those that they are better than."""
+        rows = better[:, None]
+        return Rooms(
+            np.where(rows, other.place, self.place),
+            np.where(rows, other.wall, self.wall),
+            np.where(better, other.misfit, self.misfit),
+            np.where(better, other.price, self.price),
+        )
+
+
+def rooms_of(
+    places: Float[np.ndarray, "rooms walls"], axes: Float[np.ndarray, "2 2"], evidence: Evidence
+) -> Rooms:
+    """Return rooms and what they cost."""
     corners = corners_of(places, axes)
-    distance, _ = seen_walls(corners, evidence.ray)
+    distance, wall = seen_walls(corners, evidence.ray)
     misfit = column_costs(distance, evidence).sum(-1)
     lon = np.arctan2(corners[..., 0], corners[..., 1])
     far = np.hypot(corners[..., 0], corners[..., 1])
@@ -158,7 +189,7 @@ def room_costs(
         missed = apart.min(1) > width // 64
         price = price + UNEXPLAINED * (missed * evidence.corner[evidence.peaks]).sum(-1)
     outside = (distance >= FAR_AWAY).any(-1) | ~_around(corners)
-    return np.stack((np.where(outside, np.inf, misfit), price))
+    return Rooms(places, wall, np.where(outside, np.inf, misfit), price)
 
 
 def _around(corners: Float[np.ndarray, "rooms walls 2"]) -> Bool[np.ndarray, " rooms"]:

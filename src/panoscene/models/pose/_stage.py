@@ -9,11 +9,11 @@ from torch.nn import functional
 
 from panoscene.geometry import OrientedBoxes, decode_box_code, perspective_crop
 from panoscene.models._editions import Edition
-from panoscene.models._weights import read_weights, read_weights_header, weights_file
+from panoscene.models._weights import config_of, read_weights, weights_file
 from panoscene.scene import CATEGORIES, Detections, Layout, Objects
 
 from ._clues import pose_clues
-from ._config import CONFIGS, PoseConfig
+from ._config import CONFIGS
 from ._network import PoseNetwork, PoseOutput, build_pose
 
 STAGE = "pose"
@@ -196,9 +196,7 @@ def load_pose_stage(
         CheckpointError: There are no weights, or they are for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    stored = read_weights_header(path).config
-    config = PoseConfig.model_validate(stored) if stored else CONFIGS[edition]
-    network = build_pose(config)
+    network = build_pose(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
     read_weights(path, network, stage=STAGE, edition=edition)
     return PoseStage(network.to(device))
 

@@ -20,4 +20,5 @@ from ._network import outside_probability as outside_probability
 from ._network import view_hints as view_hints
 from ._stage import ShapeStage as ShapeStage
 from ._stage import load_shape_stage as load_shape_stage
+from ._stage import slab_objects as slab_objects
 from ._stage import thin_boxes as thin_boxes

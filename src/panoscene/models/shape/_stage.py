@@ -8,14 +8,16 @@ from torch import Tensor
 
 from panoscene.geometry import perspective_crop, view_relative_yaw
 from panoscene.models._editions import Edition
-from panoscene.models._weights import read_weights, shipped_weights
-from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh
+from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh, built_in
 
 from ._config import CONFIGS
 from ._extract import extract_meshes
 from ._fewer import FACES_PER_CELL
 from ._network import ShapeNetwork, build_shape, view_hints
 
+STAGE = "shape"
+"""Name of this stage in files with weights."""
 THIN_METRES = 0.03
 """Objects whose smallest side is below it are slabs."""
 THIN_SHARE = 0.06
@@ -41,7 +43,8 @@ class ShapeStage:
     ) -> Shapes:
         """Return codes and closed meshes of all objects, in the canonical box [-1/2, 1/2]^3.
 
-        Thin objects get a slab: their box. So do, as ``box``, those whose predicted shape is empty.
+        Thin objects, doors and windows get a slab: their box. So do, as ``box``, those whose
+        predicted shape is empty.
         Where a surface is flat its triangles are joined, until there are about 32 for each cell
         along an axis: 2,048 at resolution 64.
 
@@ -57,7 +60,7 @@ class ShapeStage:
         Source: paper, Sec. 3.1; slabs and fewer triangles are ours.
         """
         codes = self.codes(image, objects)
-        network = (~thin_boxes(objects.boxes.size)).nonzero()[:, 0]
+        network = (~slab_objects(objects)).nonzero()[:, 0]
         most = FACES_PER_CELL * resolution
         found = extract_meshes(self.network, codes[network], resolution=resolution, most=most)
         meshes: list[Mesh] = [box_mesh() for _ in range(len(objects.boxes))]
@@ -104,6 +107,15 @@ def thin_boxes(size: Float[Tensor, "n 3"]) -> Bool[Tensor, " n"]:
     return (least < THIN_METRES) | (least < THIN_SHARE * most)
 
 
+def slab_objects(objects: Objects) -> Bool[Tensor, " n"]:
+    """Return for which objects the box itself is the best shape: thin ones, doors and windows.
+
+    Args:
+        objects: Their boxes and categories.
+    """
+    return thin_boxes(objects.boxes.size) | built_in(objects.category).to(objects.boxes.size.device)
+
+
 def load_shape_stage(
     edition: Edition = "compact", weights: Path | None = None, device: str = "cpu"
 ) -> ShapeStage:
@@ -117,7 +129,7 @@ def load_shape_stage(
     Raises:
         CheckpointError: The weights are missing or for another network.
     """
-    network = build_shape(CONFIGS[edition])
-    path = shipped_weights("shape") if weights is None else weights
-    read_weights(path, network, stage="shape", edition=edition)
+    path = weights_file(STAGE, edition, weights)
+    network = build_shape(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
+    read_weights(path, network, stage=STAGE, edition=edition)
     return ShapeStage(network, device)
