@@ -108,6 +108,7 @@ def test_what_is_done_is_kept_and_other_sources_are_refused(
     manifest = json.loads((tmp_path / "export.json").read_text())
     assert manifest["scenes"] == 1
     assert set(manifest["methods"]) == set(ROWS)
+    assert manifest["parts"] == {item.name: item.split}
     assert all((tmp_path / "predictions" / n / f"{item.name}.json").is_file() for n in ROWS)
     score = ["eval", "score", str(tmp_path), "-o", str(tmp_path / "scores")]
     assert main([*score, "--replicates", "0", "--workers", "1"]) == 0

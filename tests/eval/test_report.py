@@ -306,3 +306,31 @@ def test_what_disagrees_in_the_paper_has_a_note() -> None:
 def test_a_field_of_view_is_one(fov_deg: int) -> None:
     with pytest.raises(ValueError, match="fov_deg"):
         scores("a", fov_deg)
+
+
+def rendered(method: str, **metrics: float) -> ScoreFile:
+    return scores(method, 360, **metrics).model_copy(
+        update={"data": "rendered homes of version 1, test-seen and test-unseen"}
+    )
+
+
+def test_the_page_says_where_relations_are_better_than_the_rule_and_where_not() -> None:
+    wall, floor = "relations__touching_wall_f1", "relations__on_floor_f1"
+    rule = rendered("pose", **{wall: 0.876, floor: 0.9}, relations__on_floor_in_target=50.0)
+    page = results_page([rendered("full", **{wall: 0.866, floor: 0.95}), rule])
+    assert "`full` is ahead in floor, not in wall (86.6 to 87.6)." in page
+    assert "True ones between the matched objects of `pose`: 50 of floor." in page
+    assert "against the rule" not in results_page([scores("full"), scores("pose")])
+
+
+def test_parts_of_the_set_have_rows_of_their_own() -> None:
+    seen = {"detection.ap_15_mean_57": Measured(value=0.314)}
+    unseen = {"detection.ap_15_mean_57": Measured(value=0.185)}
+    full = rendered("full").model_copy(update={"parts": {"test-unseen": unseen, "test-seen": seen}})
+    page = results_page([full, rendered("pose")])
+    rows = [line for line in page.splitlines() if line.startswith("| `full` | `test-")]
+    assert [row.split("|")[2:4] for row in rows] == [
+        [" `test-seen` ", " 31.4 "],
+        [" `test-unseen` ", " 18.5 "],
+    ]
+    assert "## Parts of the set" not in results_page([rendered("pose")])

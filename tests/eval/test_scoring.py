@@ -172,6 +172,20 @@ def test_scores_without_a_field_of_view_are_of_whole_rooms(export: Path, tmp_pat
     assert read_scores(tmp_path / "a.json").fov_deg == 360
 
 
+def test_each_part_of_the_targets_is_scored_by_itself(export: Path) -> None:
+    names = sorted(path.stem for path in (export / "targets").glob("*.json"))
+    parts = {name: "even" if k % 2 == 0 else "odd" for k, name in enumerate(names)}
+    folders = export / "predictions" / "estimates", export / "targets"
+    found = score_folder(*folders, parts=parts, replicates=0)
+    counts = [part["layout.regularised.overall.scenes"].value for part in found.parts.values()]
+    assert sum(counts) == len(names)
+    even = found.parts["even"]["detection.recall_15"].value
+    odd = found.parts["odd"]["detection.recall_15"].value
+    whole = found.metrics["detection.recall_15"].value
+    assert min(even, odd) <= whole <= max(even, odd)
+    assert score_folder(*folders, parts=dict.fromkeys(names, "all"), replicates=0).parts == {}
+
+
 def test_weak_relations_come_with_the_same_boxes(tmp_path: Path) -> None:
     taken: list[Inputs] = []
 
@@ -200,7 +214,7 @@ def test_a_damaged_manifest_is_named(export: Path, tmp_path: Path) -> None:
     with pytest.raises(SceneFormatError, match=r"export\.json"):
         read_manifest(tmp_path / "export.json")
     assert main(["eval", "score", str(tmp_path)]) == 2
-    _, methods = read_manifest(export / "export.json")
+    methods = read_manifest(export / "export.json").methods
     assert methods["truth"].kind == "oracle"
 
 

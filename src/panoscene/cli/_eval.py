@@ -25,6 +25,7 @@ from panoscene.eval import (
     SUMMARY,
     TARGETS,
     ExportedMethod,
+    Manifest,
     ScoreFile,
     export_predictions,
     export_reconstructions,
@@ -140,7 +141,7 @@ def run_score(
         raise InputError(f"{source}: found no folder there, expected predictions or an export")
     if output is not None:
         check_folder(output)
-    jobs, data = _jobs(source, targets)
+    jobs, known = _jobs(source, targets)
     results: list[ScoreFile] = []
     count = sum(len(list(job[2].glob("*.json"))) for job in jobs)
     with progress_bar("scoring", count) as advance:
@@ -152,7 +153,8 @@ def run_score(
                 kind=facts.kind,
                 description=facts.description,
                 fov_deg=facts.fov_deg,
-                data=data,
+                data=known.data,
+                parts=known.parts,
                 shapes=shapes and (targets is not None or _has_meshes(folder)),
                 replicates=replicates,
                 workers=workers or os.cpu_count() or 1,
@@ -210,19 +212,21 @@ def run_report(
     return 0
 
 
-def _jobs(source: Path, targets: Path | None) -> tuple[list[Job], str]:
-    """Return each folder of predictions with what is known of it, and its targets."""
+def _jobs(source: Path, targets: Path | None) -> tuple[list[Job], Manifest]:
+    """Return each folder of predictions with what is known of it, and of all targets."""
     manifest = source / MANIFEST
     if targets is not None or not manifest.exists():
         if targets is None:
             expected = "--targets FOLDER with the true scenes, or a folder made by eval export"
             raise InputError(f"{source}: found predictions alone, expected {expected}")
-        return [(source, ExportedMethod("prediction", ""), targets)], str(targets)
-    data, methods = read_manifest(manifest)
+        known = Manifest(data=str(targets), methods={})
+        return [(source, ExportedMethod("prediction", ""), targets)], known
+    known = read_manifest(manifest)
     jobs = [
-        (source / PREDICTIONS / name, known, source / TARGETS) for name, known in methods.items()
+        (source / PREDICTIONS / name, method, source / TARGETS)
+        for name, method in known.methods.items()
     ]
-    return jobs, data
+    return jobs, known
 
 
 def _named(files: list[Path]) -> list[Scene]:

@@ -29,6 +29,7 @@ from panoscene.eval._export import MANIFEST as MANIFEST
 from panoscene.eval._export import PREDICTIONS as PREDICTIONS
 from panoscene.eval._export import TARGETS as TARGETS
 from panoscene.eval._export import ExportedMethod as ExportedMethod
+from panoscene.eval._export import Manifest as Manifest
 from panoscene.eval._export import export_predictions as export_predictions
 from panoscene.eval._export import read_manifest as read_manifest
 from panoscene.eval._export import sample_targets as sample_targets

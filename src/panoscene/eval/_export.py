@@ -36,11 +36,15 @@ class ExportedMethod:
     """Horizontal degrees that the method sees at a time."""
 
 
-class _Manifest(BaseModel):
+class Manifest(BaseModel):
     """The part of ``export.json`` that scoring needs."""
 
     data: str
+    """What the targets are."""
     methods: dict[str, ExportedMethod]
+    """What is known of each folder of predictions."""
+    parts: dict[str, str] = {}
+    """Part of the data set that each target is from, by its name; empty if there is one only."""
 
 
 def sample_targets(count: int, seed: int) -> list[Scene]:
@@ -115,7 +119,7 @@ def export_predictions(
     return done
 
 
-def read_manifest(path: Path) -> tuple[str, dict[str, ExportedMethod]]:
+def read_manifest(path: Path) -> Manifest:
     """Return what the targets of an export are, and what is known of each method.
 
     Raises:
@@ -123,13 +127,12 @@ def read_manifest(path: Path) -> tuple[str, dict[str, ExportedMethod]]:
         OSError: it cannot be read.
     """
     try:
-        manifest = _Manifest.model_validate_json(path.read_bytes())
+        return Manifest.model_validate_json(path.read_bytes())
     except ValidationError as error:
         detail = error.errors(include_url=False)[0]
         where = ".".join(map(str, detail["loc"])) or "$"
         problem = Problem(where, repr(detail["input"])[:60], detail["msg"])
         raise SceneFormatError(path, [problem]) from None
-    return manifest.data, manifest.methods
 
 
 def _simulation(targets: Sequence[Scene], seed: int, noise: EstimateNoise) -> Simulate:

@@ -71,6 +71,7 @@ def export_reconstructions(
         "data": data,
         "scenes": len(items),
         "sources": dict(sources),
+        "parts": {item.name: item.split for item in items},
         "methods": {name: asdict(row) for name, row in ROWS.items()},
     }
     write_atomically(output / MANIFEST, json.dumps(manifest, indent=2) + "\n")

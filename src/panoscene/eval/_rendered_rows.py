@@ -9,7 +9,11 @@ RENDERED = "rendered homes"
 """What the targets' description begins with when they are panoramas of a rendered set."""
 ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
     {
-        "full": ExportedMethod("ours", "the whole pipeline; the relations are those of its boxes"),
+        "full": ExportedMethod(
+            "ours",
+            "the whole pipeline; the relations are those of its boxes, and contacts that the"
+            " network thinks likely where boxes are at most 0.3 m apart",
+        ),
         "without-arrangement": ExportedMethod(
             "ours", "the same without the arrangement; the relations are what the network says"
         ),

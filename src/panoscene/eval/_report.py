@@ -7,7 +7,6 @@ from typing import Any
 from panoscene.eval._paper_rows import (
     paper_57_note,
     paper_counts_table,
-    paper_relations_row,
     paper_semantic_note,
     paper_semantic_rows,
 )
@@ -23,16 +22,14 @@ from panoscene.eval._report_facts import (
     truth_row,
     whole_rooms,
 )
+from panoscene.eval._report_relations import relations_part
 from panoscene.eval._report_seconds import seconds_part
-from panoscene.eval._report_tables import category_part, fov_part, layout_part
-from panoscene.eval._results import Measured, ScoreFile
+from panoscene.eval._report_tables import by_part, category_part, fov_part, layout_part
+from panoscene.eval._results import ScoreFile
 from panoscene.eval._score_tables import (
     AP_15_57,
     DETECTION,
-    END_TO_END,
-    FIDELITY,
     MATCHED_RECALL,
-    MATCHED_RELATIONS,
     PAPER_COUNTS,
     PENETRATION,
     PLAUSIBILITY,
@@ -44,7 +41,6 @@ from panoscene.eval._score_tables import (
     Column,
     column_cell,
     markdown_table,
-    measured_cell,
     score_table,
     with_counts,
 )
@@ -71,7 +67,7 @@ def results_page(scores: Sequence[ScoreFile], timings: Mapping[str, Any] | None 
         *_introduction(scores),
         *_detection_part(whole),
         *_plausibility_part(whole),
-        *_relations_part(whole),
+        *relations_part(whole),
         *layout_part(whole),
         "## Semantic segmentation",
         "IoU in percent of the PanoContext protocol's 12 labels, on evenly spread directions. The "
@@ -79,6 +75,7 @@ def results_page(scores: Sequence[ScoreFile], timings: Mapping[str, Any] | None 
         score_table(whole, SEMANTIC, beside=paper_semantic_rows(SEMANTIC)),
         *_meshes_part(whole),
         *seconds_part(timings),
+        *by_part(whole),
         *fov_part(scores),
         *category_part(whole),
         "## The paper's own numbers",
@@ -299,47 +296,6 @@ def _plausibility_part(scores: Sequence[ScoreFile]) -> list[str]:
         score_table(scores, MATCHED_RECALL),
     ]
     return parts
-
-
-def _relations_part(scores: Sequence[ScoreFile]) -> list[str]:
-    parts = [
-        "## Relations",
-        "Are the relation scores right? In percent and end to end: relations of missed objects "
-        "count as missed, those of invented objects as false. TPR is the share of true relations "
-        "that is claimed.",
-        score_table(scores, END_TO_END),
-        "The same between matched objects only, as in the paper: a method that finds fewer "
-        "objects answers fewer questions. TNR is the share of rightly denied relations; a random "
-        "guess of a yaw is 90° off. The last row is the paper's network on its own data.",
-        score_table(scores, MATCHED_RELATIONS, beside=[paper_relations_row(MATCHED_RELATIONS)]),
-        "`farther_than` is measured too, but not listed: one of two objects is always the farther "
-        "one, so its F1 is nothing but the share of pairs in the right order, a coin gets half of "
-        "them right, and the paper prints no number to compare it with.",
-        "Do the predicted *boxes* have the relations that the true boxes have? Between matched "
-        "objects; yaw errors are from the nearest of 8 directions to the true difference.",
-        score_table(scores, FIDELITY),
-    ]
-    return [*parts, _flawed_truth(scores)]
-
-
-def _flawed_truth(scores: Sequence[ScoreFile]) -> str:
-    """Return why the truth does not have all of its own relations; empty if it has."""
-    truth = truth_row(scores)
-    short: list[str] = []
-    known = {} if truth is None else truth.metrics
-    for column in FIDELITY:
-        measured = known.get(column.metric)
-        if column.heading.endswith("F1") and measured is not None and measured.value is not None:
-            cell = measured_cell(Measured(value=measured.value), column.factor)
-            short += [f"{column.heading} {cell}"] if measured.value < 1 else []
-    if not short:
-        return ""
-    such = " (a sampled stool before its piano, a window below the ceiling)"
-    return (
-        f"Why is the truth not perfect ({', '.join(short)})? Its files say which relations hold; "
-        "here they are derived again from the boxes. Things exactly as far apart as the tolerance "
-        f"of 10 cm{such if are_simulated(scores) else ''} are on either side of it by rounding."
-    )
 
 
 def _meshes_part(scores: Sequence[ScoreFile]) -> list[str]:

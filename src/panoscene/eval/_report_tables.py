@@ -13,6 +13,7 @@ from panoscene.eval._report_facts import (
 from panoscene.eval._results import ScoreFile
 from panoscene.eval._score_tables import (
     FIELD_OF_VIEW,
+    SUMMARY,
     Column,
     column_cell,
     markdown_table,
@@ -49,6 +50,26 @@ def layout_part(scores: Sequence[ScoreFile]) -> list[str]:
     if table:
         parts += [f"The layout of `{first.method}` by the number of corners of the room:", table]
     return parts
+
+
+def by_part(scores: Sequence[ScoreFile]) -> list[str]:
+    """Return the summary of each part of the data set; nothing where there is one part only."""
+    names = sorted({name for score in scores for name in score.parts})
+    if not names:
+        return []
+    rows = [
+        [f"`{score.method}`", f"`{name}`", *(column_cell(part, column) for column in SUMMARY)]
+        for score in scores
+        for name in names
+        if name in score.parts
+        for part in [score.model_copy(update={"metrics": score.parts[name]})]
+    ]
+    head = ["method", "part", *(column.heading for column in SUMMARY)]
+    return [
+        "## Parts of the set",
+        f"The summary for {listed([f'`{name}`' for name in names])} alone.",
+        markdown_table(head, rows, left=2),
+    ]
 
 
 def _layout_table(scores: Sequence[ScoreFile]) -> str:

@@ -59,6 +59,8 @@ class ScoreFile(_Model):
     """By dotted names, such as ``detection.ap_15_mean_57``."""
     categories: dict[str, dict[str, Measured]]
     """Per category; categories without targets and predictions are left out."""
+    parts: dict[str, dict[str, Measured]] = {}
+    """The metrics of single parts of the data set; empty if there is one part only."""
 
 
 def write_scores(scores: ScoreFile, path: str | os.PathLike[str]) -> None:

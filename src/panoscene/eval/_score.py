@@ -1,11 +1,12 @@
 """Scores of predictions on disk: every target counts, and each scene is measured once."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
+from types import MappingProxyType
 
 import torch
 
@@ -14,18 +15,18 @@ from panoscene.eval._bootstrap import REPLICATES
 from panoscene.eval._layout_scores import layout_record
 from panoscene.eval._pooling import RECALL_LEVELS, pooled_categories, pooled_metrics
 from panoscene.eval._predictions import Prediction, read_prediction
-from panoscene.eval._results import ScoreFile
+from panoscene.eval._results import Measured, ScoreFile
 from panoscene.eval._scene_records import SceneRecords, records_at_recall, scene_records
 from panoscene.scene import Problem, Scene, SceneFormatError, read_scene
 
 _CHUNK = 32
 """Scenes that a process measures at a time."""
 _WORTH_PROCESSES = 128
-"""Fewer scenes are done before another process has loaded the libraries."""
+"""Fewer scenes are done before another process has loaded the libraries, but meshes take long."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _Scored:
     """What some of the scenes gave."""
 
     records: list[SceneRecords]
@@ -43,6 +44,7 @@ def score_folder(
     description: str = "",
     fov_deg: int = 360,
     data: str = "",
+    parts: Mapping[str, str] = MappingProxyType({}),
     shapes: bool = False,
     replicates: int = REPLICATES,
     seed: int = 0,
@@ -65,6 +67,8 @@ def score_folder(
         description: one line about the method.
         fov_deg: horizontal degrees that the method saw at a time.
         data: what the targets are.
+        parts: part of the data set that each target is from, by its name; if there are several,
+            each is scored by itself, too.
         shapes: also compare meshes, where the targets have them; slower.
         replicates: bootstrap resamples of the scenes for the 95 % intervals.
         seed: of the resampling.
@@ -81,26 +85,30 @@ def score_folder(
         (predictions, targets, names[first : first + _CHUNK], shapes)
         for first in range(0, len(names), _CHUNK)
     ]
-    parts: list[_Part] = []
+    measured: list[_Scored] = []
 
-    def keep(part: _Part) -> None:
-        parts.append(part)
-        for warning in part.warnings:
+    def keep(some: _Scored) -> None:
+        measured.append(some)
+        for warning in some.warnings:
             if warn is not None:
                 warn(warning)
         if progress is not None:
-            progress(len(part.records))
+            progress(len(some.records))
 
-    if workers > 1 and len(names) >= _WORTH_PROCESSES:
+    if workers > 1 and len(jobs) > 1 and (shapes or len(names) >= _WORTH_PROCESSES):
         context = get_context("spawn")
         with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
-            for part in pool.map(_measure, jobs):
-                keep(part)
+            for some in pool.map(_measure, jobs):
+                keep(some)
     else:
-        for part in map(_measure, jobs):
-            keep(part)
-    records = [record for part in parts for record in part.records]
-    at_recall = {level: records_at_recall(records, level) for level in RECALL_LEVELS}
+        for some in map(_measure, jobs):
+            keep(some)
+    records = [record for some in measured for record in some.records]
+
+    def metrics(chosen: Sequence[SceneRecords]) -> dict[str, Measured]:
+        at_recall = {level: records_at_recall(chosen, level) for level in RECALL_LEVELS}
+        return pooled_metrics(chosen, at_recall, replicates=replicates, seed=seed)
+
     return ScoreFile(
         panoscene=__version__,
         method=method or predictions.name,
@@ -111,13 +119,14 @@ def score_folder(
         scenes=len(records),
         objects=sum(record.targets for record in records),
         missing=sum(record.missing for record in records),
-        invalid=sum(part.invalid for part in parts),
+        invalid=sum(some.invalid for some in measured),
         targets_hash=_hash(targets, names),
         predictions_hash=_hash(predictions, names),
         replicates=replicates,
         seed=seed,
-        metrics=pooled_metrics(records, at_recall, replicates=replicates, seed=seed),
+        metrics=metrics(records),
         categories=pooled_categories(records),
+        parts={name: metrics(some) for name, some in _by_part(records, names, parts).items()},
     )
 
 
@@ -135,7 +144,17 @@ def _names(predictions: Path, targets: Path) -> list[str]:
     return wanted
 
 
-def _measure(job: tuple[Path, Path, list[str], bool]) -> _Part:
+def _by_part(
+    records: Sequence[SceneRecords], names: Sequence[str], parts: Mapping[str, str]
+) -> dict[str, list[SceneRecords]]:
+    """Return the records of each part; nothing if there is one part only."""
+    found: dict[str, list[SceneRecords]] = {}
+    for record, name in zip(records, names, strict=True):
+        found.setdefault(parts.get(Path(name).stem, ""), []).append(record)
+    return {part: found[part] for part in sorted(found)} if len(found) > 1 else {}
+
+
+def _measure(job: tuple[Path, Path, list[str], bool]) -> _Scored:
     predictions, targets, names, shapes = job
     threads = torch.get_num_threads()
     # tensors this small are slower with more threads, and processes already share the cores
@@ -147,7 +166,7 @@ def _measure(job: tuple[Path, Path, list[str], bool]) -> _Part:
             for name, target in zip(names, true, strict=True)
         ]
         records = scene_records([prediction.scene for prediction in found], true, shapes=shapes)
-        return _Part(
+        return _Scored(
             records=list(map(_with_layout_of, records, found, true)),
             warnings=[prediction.warning for prediction in found if prediction.warning],
             invalid=sum(prediction.invalid for prediction in found),

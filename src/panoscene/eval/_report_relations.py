@@ -1,0 +1,116 @@
+"""The part of the page of results about relations."""
+
+from collections.abc import Sequence
+
+from panoscene.eval._paper_rows import paper_relations_row
+from panoscene.eval._report_facts import are_rendered, are_simulated, listed, truth_row
+from panoscene.eval._results import Measured, ScoreFile
+from panoscene.eval._score_tables import (
+    END_TO_END,
+    FIDELITY,
+    MATCHED_RELATIONS,
+    Column,
+    measured_cell,
+    score_table,
+)
+
+_RULE, _TOLD = "pose", ("full", "without-arrangement")
+"""The row whose relations follow from the boxes of the pose network, and those that know more."""
+
+
+def relations_part(scores: Sequence[ScoreFile]) -> list[str]:
+    """Return the tables of relations, and who is better at them than the rule of geometry."""
+    parts = [
+        "## Relations",
+        "Are the relation scores right? In percent and end to end: relations of missed objects "
+        "count as missed, those of invented objects as false. TPR is the share of true relations "
+        "that is claimed.",
+        score_table(scores, END_TO_END),
+        _against_rule(scores, END_TO_END),
+        "The same between matched objects only, as in the paper: a method that finds fewer "
+        "objects answers fewer questions. TNR is the share of rightly denied relations; a random "
+        "guess of a yaw is 90° off. The last row is the paper's network on its own data.",
+        score_table(scores, MATCHED_RELATIONS, beside=[paper_relations_row(MATCHED_RELATIONS)]),
+        _against_rule(scores, MATCHED_RELATIONS),
+        "`farther_than` is measured too, but not listed: one of two objects is always the farther "
+        "one, so its F1 is nothing but the share of pairs in the right order, a coin gets half of "
+        "them right, and the paper prints no number to compare it with.",
+        "Do the predicted *boxes* have the relations that the true boxes have? Between matched "
+        "objects; yaw errors are from the nearest of 8 directions to the true difference.",
+        score_table(scores, FIDELITY),
+    ]
+    return [*parts, _flawed_truth(scores)]
+
+
+def _flawed_truth(scores: Sequence[ScoreFile]) -> str:
+    """Return why the truth does not have all of its own relations; empty if it has."""
+    truth = truth_row(scores)
+    short: list[str] = []
+    known = {} if truth is None else truth.metrics
+    for column in FIDELITY:
+        measured = known.get(column.metric)
+        if column.heading.endswith("F1") and measured is not None and measured.value is not None:
+            cell = measured_cell(Measured(value=measured.value), column.factor)
+            short += [f"{column.heading} {cell}"] if measured.value < 1 else []
+    if not short:
+        return ""
+    such = " (a sampled stool before its piano, a window below the ceiling)"
+    return (
+        f"Why is the truth not perfect ({', '.join(short)})? Its files say which relations hold; "
+        "here they are derived again from the boxes. Things exactly as far apart as the tolerance "
+        f"of 10 cm{such if are_simulated(scores) else ''} are on either side of it by rounding."
+    )
+
+
+def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str:
+    """Return in which F1 our relations are ahead of the rule, and in which not.
+
+    Empty where the page is not about rendered homes.
+    """
+    rows = {score.method: score for score in scores}
+    if not are_rendered(scores) or _RULE not in rows:
+        return ""
+    rule = rows[_RULE]
+    verdicts = []
+    for name in _TOLD:
+        if name not in rows:
+            continue
+        ahead, behind = [], []
+        for column in columns:
+            ours, theirs = (row.metrics.get(column.metric) for row in (rows[name], rule))
+            if not column.heading.endswith("F1") or ours is None or theirs is None:
+                continue
+            if ours.value is not None and theirs.value is not None:
+                better = ours.value > theirs.value
+                (ahead if better else behind).append((column, ours, theirs))
+        words = f"`{name}` is ahead in {listed([_relation(column) for column, _, _ in ahead])}"
+        if behind:
+            cells = [
+                f"{_relation(column)} ({measured_cell(Measured(value=ours.value), column.factor)}"
+                f" to {measured_cell(Measured(value=theirs.value), column.factor)})"
+                for column, ours, theirs in behind
+            ]
+            words += f", not in {listed(cells)}"
+        verdicts.append(words)
+    if not verdicts:
+        return ""
+    truth = [
+        f"{measured.value:.0f} of {_relation(column)}"
+        for column in columns
+        if column.heading.endswith("F1")
+        and (measured := rule.metrics.get(_count_of(column))) is not None
+        and measured.value is not None
+    ]
+    counted = f" True ones between the matched objects of `{_RULE}`: {listed(truth)}."
+    return (
+        f"F1 against the rule of geometry on the boxes of `{_RULE}`: {'; '.join(verdicts)}."
+        f"{counted if truth and columns is MATCHED_RELATIONS else ''}"
+    )
+
+
+def _relation(column: Column) -> str:
+    return column.heading.removesuffix(" F1")
+
+
+def _count_of(column: Column) -> str:
+    return f"{column.metric.removesuffix('_f1')}_in_target"
