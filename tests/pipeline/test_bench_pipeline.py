@@ -3,22 +3,42 @@
 import json
 
 import pytest
+import torch
+from torch import Tensor
 
 from panoscene.cli import _measure_pipeline as measure
 from panoscene.cli import main
+from panoscene.models.shape import ShapeStage
 from panoscene.pipeline import Stages
+from panoscene.scene import Objects, Shapes
 
 from .conftest import Knowing
 
-STAGES = {"detector_s", "layout_s", "pose_s", "shape_64_s", "shape_128_s"}
+STAGES = {"detector_s", "layout_s", "pose_s", "codes_s", "shape_64_s", "shape_128_s"}
 PARTS = {"upright_s", "detector_s", "layout_s", "pose_s", "arrangement_s", "shape_s"}
+
+
+class KnowingShape(ShapeStage):
+    """Gives shapes without a network."""
+
+    def __init__(self, knowing: Knowing) -> None:
+        self.knowing = knowing
+
+    def __call__(self, image: Tensor, objects: Objects, *, resolution: int = 64) -> Shapes:
+        return self.knowing.shape(image, objects, resolution=resolution)
+
+    def codes(self, image: Tensor, objects: Objects) -> Tensor:
+        return torch.zeros(len(objects.boxes), 4)
 
 
 @pytest.fixture(autouse=True)
 def quick(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> None:
     def load_stages() -> Stages:
         # whatever detections there are, the boxes are as many
-        return knowing.stages(pose=lambda image, found, layout, height: knowing.truth.objects)
+        return knowing.stages(
+            pose=lambda image, found, layout, height: knowing.truth.objects,
+            shape=KnowingShape(knowing),
+        )
 
     monkeypatch.setattr(measure, "load_stages", load_stages)
     monkeypatch.setattr(measure, "_command_seconds", lambda: 7.5)

@@ -26,7 +26,7 @@ def test_the_package_loads_pipelines_and_is_light_to_import() -> None:
 
 def test_the_command_waits_for_no_library_that_it_does_not_need() -> None:
     heavy = (
-        "ezdxf", "matplotlib.pyplot", "networkx", "sympy", "timm", "torch._dynamo", "torchvision",
+        "ezdxf", "matplotlib", "networkx", "sympy", "timm", "torch._dynamo", "torchvision",
         "trimesh",
     )  # fmt: skip
     code = f"""

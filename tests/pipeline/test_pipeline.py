@@ -11,7 +11,15 @@ from panoscene.geometry import paired_box_iou
 from panoscene.models.layout import LayoutPrediction
 from panoscene.models.upright import UprightEstimate
 from panoscene.pipeline import Given, Pipeline
-from panoscene.scene import Detections, Panorama, Scene, select_objects
+from panoscene.scene import (
+    Detections,
+    Mesh,
+    Panorama,
+    Scene,
+    Shapes,
+    box_mesh,
+    select_objects,
+)
 
 from .conftest import Image, Knowing
 
@@ -50,6 +58,16 @@ def test_given_records_take_the_place_of_stages(truth: Scene, image: Tensor) -> 
     seen = Detections(truth.objects.bfov, truth.objects.category, truth.objects.score)
     Pipeline(knowing.stages(shape=None))(image, truth.panorama, given=Given(detections=seen))
     assert knowing.asked == ["layout", "pose"]
+
+
+def test_given_meshes_stay(truth: Scene, image: Tensor) -> None:
+    knowing, one = Knowing(truth), Mesh(box_mesh().vertices * 0.5, box_mesh().faces)
+    shapes = Shapes(mesh=(one,) * len(truth.objects.boxes))
+    objects = replace(truth.objects, shapes=shapes)
+    given = Given(layout=truth.layout, objects=objects)
+    result = Pipeline(knowing.stages())(image, truth.panorama, given=given)
+    assert knowing.asked == []
+    assert all(mesh is one for mesh in result.scene.objects.shapes.mesh)
 
 
 def test_a_room_without_objects_is_a_scene_with_a_doubt(truth: Scene, image: Tensor) -> None:

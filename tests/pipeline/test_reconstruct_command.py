@@ -121,6 +121,8 @@ def test_resume_leaves_out_what_is_there(
         (["--camera-height", "0"], "--camera-height: found 0"),
         (["--resolution", "100"], "--resolution: found 100, expected 32, 64, 128 or 256"),
         (["--device", "abacus"], "--device: found abacus"),
+        (["--device", "meta"], "--device: found meta, which cannot be used"),
+        (["--edition", "paper"], "--edition paper: found no --weights, expected a folder"),
         (["--weights", "nowhere"], "--weights nowhere: found no folder there"),
         (["--steps", "-1"], "--steps: found -1"),
     ],

@@ -44,6 +44,24 @@ def test_jpeg(tmp_path: Path) -> None:
     assert (image - expected_rgb()).abs().mean() < 0.02
 
 
+@pytest.mark.parametrize("mode", ["RGB", "I;16"])
+def test_a_picture_with_more_columns_than_enough_is_reduced(tmp_path: Path, mode: str) -> None:
+    path = tmp_path / "pano.png"
+    whole = Image.fromarray(gradient())
+    if mode == "I;16":
+        whole = Image.fromarray(gradient()[..., 0].astype(np.uint16) * 257)
+    whole.save(path)
+    image, panorama = read_panorama(path, columns=WIDTH // 2)
+    assert (panorama.width, panorama.height) == (WIDTH, HEIGHT)
+    pixels = read_panorama(path)[0]
+    mean = torch.nn.functional.avg_pool2d(pixels[None], 2)[0]
+    torch.testing.assert_close(image, mean, atol=0.003, rtol=0)
+    for enough in (WIDTH // 2 + 1, WIDTH, 4 * WIDTH):
+        assert torch.equal(read_panorama(path, columns=enough)[0], pixels)
+    with pytest.raises(ValueError, match="columns"):
+        read_panorama(path, columns=0)
+
+
 def test_greyscale(tmp_path: Path) -> None:
     Image.fromarray(gradient()[..., 0]).save(tmp_path / "pano.png")
     image, _ = read_panorama(tmp_path / "pano.png")

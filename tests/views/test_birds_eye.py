@@ -67,6 +67,9 @@ def test_a_sound_room_has_no_red_and_a_disturbed_one_has(tmp_path: Path) -> None
     draw_birds_eye(disturbed, tmp_path / "disturbed.png", size_px=SMALL)
     assert red(tmp_path / "sound.png", 360) == 0
     assert red(tmp_path / "disturbed.png", 360) > 200
+    # all is forgiven
+    draw_birds_eye(disturbed, tmp_path / "forgiven.png", size_px=SMALL, tolerance=9.0)
+    assert red(tmp_path / "forgiven.png", 360) == 0
 
 
 def test_collisions_count_in_space_not_in_plan(tmp_path: Path) -> None:

@@ -71,8 +71,9 @@ def draw_pictures(
     yield "birds-eye.png"
     draw_overlay(scene, output / "overlay.png", image=image, reference=reference)
     yield "overlay.png"
-    rendering, view = draw_renderings(scene, output)
+    rendering = draw_inside(scene, output)
     yield "render.png"
+    view = draw_outside(scene, output)
     yield "view.png"
     if sheet:
         row = SheetRow(scene.name or "Room", scene, image=image, rendering=rendering, view=view)
@@ -90,15 +91,18 @@ def draw_pictures(
     yield "report.html"
 
 
-def draw_renderings(
-    scene: Scene, output: Path
-) -> tuple[Float[Tensor, "3 rows columns"], Float[Tensor, "3 height width"]]:
-    """Render a scene from its camera and from outside into a folder, and return both pictures."""
+def draw_inside(scene: Scene, output: Path) -> Float[Tensor, "3 rows columns"]:
+    """Render a scene from its own camera into a folder, and return the picture."""
     rendering = render_panorama(scene, height=RENDER_HEIGHT)
     write_image(rendering, output / "render.png")
+    return rendering
+
+
+def draw_outside(scene: Scene, output: Path) -> Float[Tensor, "3 height width"]:
+    """Render a scene from outside into a folder, and return the picture."""
     view = render_view(scene, default_view(scene))
     write_image(view, output / "view.png")
-    return rendering, view
+    return view
 
 
 def serve_file(

@@ -19,7 +19,7 @@ from panoscene.cli._errors import InputError
 from panoscene.cli._progress import progress_words
 from panoscene.cli._terminal import say, say_json
 from panoscene.eval import machine_facts
-from panoscene.models.shape import thin_boxes
+from panoscene.models.shape import ShapeStage, slab_objects
 from panoscene.pipeline import Pipeline, Stages, load_stages
 from panoscene.sample import sample_photo_path
 from panoscene.scene import Detections, Objects, read_panorama, select_objects
@@ -51,8 +51,8 @@ def run_pipeline_bench(subject: str, repeats: int, *, as_json: bool) -> int:
 def measure_stages(*, repeats: int, progress: Progress) -> dict[str, Any]:
     """Return the median seconds of each stage, for the sample photo and 20 objects.
 
-    Shapes are codes and meshes. Objects are those of the sample photo that are not slabs, again and
-    again.
+    Shapes are codes and meshes; ``codes_s`` is the part of the codes, where the stage is the
+    package's. Objects are those of the sample photo that are not slabs, again and again.
     """
     stages = load_stages()
     image, panorama = read_panorama(sample_photo_path())
@@ -67,6 +67,8 @@ def measure_stages(*, repeats: int, progress: Progress) -> dict[str, Any]:
         "layout_s": lambda: stages.layout(image, camera_height=panorama.camera_height),
         "pose_s": lambda: stages.pose(image, seen, layout, panorama.camera_height),
     }
+    if isinstance(shape, ShapeStage):
+        parts["codes_s"] = lambda: shape.codes(image, objects)
     for resolution in RESOLUTIONS:
         parts[f"shape_{resolution}_s"] = lambda r=resolution: shape(image, objects, resolution=r)
     found: dict[str, Any] = {"objects": OBJECTS, "repeats": repeats}
@@ -123,7 +125,7 @@ def _times(result: dict[str, Any]) -> dict[str, float]:
 def _many(stages: Stages, image: Float[Tensor, "3 height width"]) -> Objects:
     """Return objects of a photo, as many as are measured, again and again and none of them thin."""
     found = Pipeline(replace(stages, shape=None), settings=None)(image).scene.objects
-    thick = (~thin_boxes(found.boxes.size)).nonzero()[:, 0]
+    thick = (~slab_objects(found)).nonzero()[:, 0]
     if len(thick) == 0:
         raise ValueError("photo: found no object in it that gets a mesh")
     return select_objects(found, thick[torch.arange(OBJECTS) % len(thick)])

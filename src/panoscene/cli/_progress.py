@@ -1,17 +1,10 @@
+# ruff: noqa: PLC0415
+# The imports stand inside: where nobody watches nobody waits for them.
 """Progress on stderr, where somebody watches."""
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
 
 from panoscene.cli._terminal import note
 
@@ -22,6 +15,15 @@ def progress_bar(task: str, total: int) -> Iterator[Callable[[int], None]]:
     if total < 2 or not sys.stderr.isatty():
         yield lambda steps: None
         return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -39,5 +41,7 @@ def progress_words() -> Iterator[Callable[[str], None]]:
     if not sys.stderr.isatty():
         yield note
         return
+    from rich.console import Console
+
     with Console(stderr=True).status("starting") as status:
         yield status.update

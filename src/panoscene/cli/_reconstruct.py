@@ -2,8 +2,8 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -11,17 +11,24 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+from panoscene._ray import ray_cluster, ray_package, ray_result, spread
 from panoscene.cli._account import SCENE, account
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import check_folder
 from panoscene.cli._progress import progress_bar
-from panoscene.cli._ray import ray_cluster, spread
 from panoscene.cli._terminal import complain, note, say, say_json
 from panoscene.pipeline import Pipeline, Reconstruction, load_steps
-from panoscene.scene import CATEGORIES, PanoramaError, SceneFormatError, read_panorama
+from panoscene.scene import (
+    CATEGORIES,
+    PanoramaError,
+    SceneFormatError,
+    read_panorama,
+)
 from panoscene.style import words
 
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp"})
+ENOUGH_COLUMNS = 4096
+"""Of a photo: networks see 1,024, and 16,384 take gigabytes."""
 _RESULTS = "panoscene.cli._results"
 
 
@@ -112,6 +119,7 @@ def reconstruct_files(
     *,
     as_json: bool,
     ray: str | None = None,
+    artist: Executor | None = None,
 ) -> int:
     """Reconstruct photos, say what was found, and return the exit code.
 
@@ -123,13 +131,14 @@ def reconstruct_files(
         as_json: print the outcomes as JSON.
         ray: address of a Ray cluster to spread the photos over, "" for the one that is running
             here; None works on them in this process.
+        artist: draws pictures; None draws them in this process, as on a cluster.
     """
     folders = photo_folders(files, output)
     tasks = [Task(file, folders[file], choice) for file in files]
     left = [task for task in tasks if not (choice.resume and task.done())]
     told: dict[Path, dict[str, Any]] = {}
     with progress_bar("reconstructing", len(left)) as advance:
-        for task, outcome in _outcomes(make, left, ray):
+        for task, outcome in _outcomes(make, left, ray, artist):
             told[task.file] = outcome.entry
             if "error" in outcome.entry:
                 complain(outcome.entry["error"])
@@ -159,31 +168,40 @@ def _ahead(pipeline: Pipeline) -> Iterator[None]:
             pool.shutdown(cancel_futures=True)
 
 
+def _drawing(artist: Executor | None) -> AbstractContextManager[Executor]:
+    """Return who draws: the artist, or a thread of this process."""
+    return ThreadPoolExecutor(max_workers=1) if artist is None else nullcontext(artist)
+
+
 def _there(task: Task) -> dict[str, Any]:
     return {"photo": str(task.file), "ok": True, "output": str(task.folder), "new": False}
 
 
 def _outcomes(
-    make: Callable[[], Pipeline], tasks: Sequence[Task], ray: str | None
+    make: Callable[[], Pipeline],
+    tasks: Sequence[Task],
+    ray: str | None,
+    artist: Executor | None,
 ) -> Iterator[tuple[Task, Outcome]]:
     """Return tasks with what came of them, as they finish."""
     if not tasks:
         return
     if ray is None:
         pipeline = make()
-        with _ahead(pipeline):
+        with _ahead(pipeline), _drawing(artist) as drawing:
             for task in tasks:
-                yield task, reconstruct_one(pipeline, task)
+                yield task, reconstruct_one(pipeline, task, drawing)
         return
     # other computers start in other folders
     shared = {
         replace(task, file=task.file.resolve(), folder=task.folder.resolve()): task
         for task in tasks
     }
-    with ray_cluster(ray or None) as connected:
+    package = ray_package()
+    with ray_cluster(package, ray or None):
         given = uuid4().hex, make
-        for task, outcome in spread(connected, reconstruct_there, given, list(shared)):
-            yield shared[task], _checked(shared[task], outcome)
+        for task, reference in spread(package, reconstruct_there, given, list(shared)):
+            yield shared[task], _checked(shared[task], ray_result(package, reference))
 
 
 def reconstruct_there(run: str, make: Callable[[], Pipeline], task: Task) -> Outcome:
@@ -194,7 +212,8 @@ def reconstruct_there(run: str, make: Callable[[], Pipeline], task: Task) -> Out
     if run not in _MADE:
         _MADE.clear()
         _MADE[run] = make()
-    return reconstruct_one(_MADE[run], task)
+    with _drawing(None) as drawing:
+        return reconstruct_one(_MADE[run], task, drawing)
 
 
 _MADE: dict[str, Pipeline] = {}
@@ -212,18 +231,21 @@ def _checked(task: Task, outcome: Outcome) -> Outcome:
     return Outcome(entry | {"output": str(task.folder)}, outcome.text)
 
 
-def reconstruct_one(pipeline: Pipeline, task: Task) -> Outcome:
+def reconstruct_one(pipeline: Pipeline, task: Task, artist: Executor) -> Outcome:
     """Return what came of a photo; what is wrong with it is told and does not stop the others."""
     file, folder, choice = task.file, task.folder, task.choice
     try:
-        image, panorama = read_panorama(file, camera_height=choice.camera_height)
+        height = choice.camera_height
+        image, panorama = read_panorama(file, camera_height=height, columns=ENOUGH_COLUMNS)
         start = time.perf_counter()
-        result = pipeline(image, panorama, name=file.stem, resolution=choice.resolution)
-        seconds = time.perf_counter() - start
-        # imported meanwhile in another thread: drawing takes a second to import
-        from panoscene.cli._results import write_results  # noqa: PLC0415
+        placed = pipeline.place(image, panorama, name=file.stem)
+        # imported meanwhile in another thread
+        from panoscene.cli._results import results  # noqa: PLC0415
 
-        write_results(result, file, folder)
+        with results(placed, artist) as drawn:
+            result = pipeline.shape(placed, resolution=choice.resolution)
+            seconds = time.perf_counter() - start
+            drawn.write(result, file, folder)
     except (PanoramaError, SceneFormatError, InputError) as error:
         return Outcome({"photo": str(file), "ok": False, "error": str(error)})
     except OSError as error:

@@ -3,14 +3,24 @@
 """The command that turns photos into scenes."""
 
 import math
+from contextlib import nullcontext
 from functools import partial
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from panoscene.cli._artist import artist
 from panoscene.cli._errors import InputError
 from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFile, Output
 from panoscene.cli._synth_commands import Address
+
+_DRAWING = (
+    "panoscene.cli._results",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.figure",
+    "matplotlib.patheffects",
+)
+"""Modules that take long to import, for the process that draws."""
 
 
 def reconstruct(
@@ -69,32 +79,41 @@ def reconstruct(
         raise InputError(f"--camera-height: found {camera_height}, expected metres above 0")
     if resolution not in (32, 64, 128, 256):
         raise InputError(f"--resolution: found {resolution}, expected 32, 64, 128 or 256")
+    if edition != "compact" and weights is None:
+        raise InputError(
+            f"--edition {edition}: found no --weights, expected a folder with them: "
+            "weights come with the compact edition only"
+        )
     if weights is not None and not weights.is_dir():
         raise InputError(f"--weights {weights}: found no folder there")
-    from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
-    from panoscene.pipeline import PHOTO, load
-
-    files = photo_files(photos)
-    photo_folders(files, output)
     if steps is not None and steps < 0:
         raise InputError(f"--steps: found {steps}, expected 0 or more")
-    settings = PHOTO.model_copy(update={"steps": PHOTO.steps if steps is None else steps})
-    make = partial(
-        load,
-        edition,
-        weights=weights,
-        device=checked_device(device),
-        shapes=not no_shapes,
-        level=not keep_frame,
-        settings=None if steps == 0 else settings,
-    )
-    choice = Choice(camera_height, resolution, resume)
-    try:
-        return reconstruct_files(make, files, output, choice, as_json=json, ray=ray)
-    except ModuleNotFoundError as error:
-        if error.name != "ray":
-            raise
-        raise InputError(str(error)) from None
+    # computers of a cluster draw themselves
+    with artist(*_DRAWING) if ray is None else nullcontext() as drawing:
+        from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
+        from panoscene.pipeline import PHOTO, load
+
+        files = photo_files(photos)
+        photo_folders(files, output)
+        settings = PHOTO if steps is None else PHOTO.model_copy(update={"steps": steps})
+        make = partial(
+            load,
+            edition,
+            weights=weights,
+            device=checked_device(device),
+            shapes=not no_shapes,
+            level=not keep_frame,
+            settings=None if steps == 0 else settings,
+        )
+        choice = Choice(camera_height, resolution, resume)
+        try:
+            return reconstruct_files(
+                make, files, output, choice, as_json=json, ray=ray, artist=drawing
+            )
+        except ModuleNotFoundError as error:
+            if error.name != "ray":
+                raise
+            raise InputError(str(error)) from None
 
 
 def checked_device(name: str) -> str:
@@ -106,7 +125,8 @@ def checked_device(name: str) -> str:
     import torch
 
     try:
-        torch.zeros(1, device=name)
+        # back again: some devices make tensors that hold nothing
+        torch.zeros(1, device=name).tolist()
     except (RuntimeError, AssertionError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"--device: found {name}, which cannot be used: {reason}") from None

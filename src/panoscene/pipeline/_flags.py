@@ -11,18 +11,14 @@ from ._sphere import SphereGaps
 
 TOLD_TILT = math.radians(3.0)
 """Radians; from here on the user is told that the camera leant."""
-LEAST_WALL = math.radians(45.0)
-"""Mean angle from floor to ceiling below which there may be no walls but the horizon. Rendered
-rooms have 47 degrees and more, eight real ones 60; seas, streets and most meadows that were painted
-for comparison have at most 44."""
+LEAST_WALL_DEG = 45.0
+"""Mean angle from floor to ceiling below which there may be no walls but the horizon."""
 LEAST_CORNER = 0.5
-"""Signal of the surest corner below which none was seen: 0.69 and more in rooms, at most 0.44 in
-noise, plain pictures and on the sea."""
+"""Signal of the surest corner below which none was seen."""
 WEAK_WALL = 0.2
-"""Mean confidence of the walls below which a room may be none. Real rooms have 0.35 and more, but
-a meadow 0.6, so it says little."""
+"""Mean confidence of the walls below which a room may be none."""
 WEAK_EMPTY_WALL = 0.45
-"""The same where nothing was found in the room either: clouds have 0.34 to 0.41."""
+"""The same where nothing was found in the room either."""
 
 
 def photo_flags(gaps: SphereGaps, tilt: float) -> tuple[Flag, ...]:
@@ -68,20 +64,34 @@ def scene_flags(read: LayoutPrediction | None, scene: Scene) -> tuple[Flag, ...]
     return tuple(flags)
 
 
-def _not_indoors(read: LayoutPrediction, scene: Scene) -> tuple[Flag, ...]:
-    """Return the flag for a picture that shows no walls, no corner, or none to be sure of."""
+def room_signs(read: LayoutPrediction, camera_height: float) -> dict[str, float]:
+    """Return what tells rooms from other pictures, by name.
+
+    ``wall_deg`` is the mean angle from floor to ceiling, ``corner`` the signal of the surest
+    corner, ``wall_score`` the mean confidence of the walls.
+
+    Args:
+        read: the layout with the signals that it was read from.
+        camera_height: metres.
+    """
     layout = read.layout
     ceiling, floor = boundary_from_layout(
-        layout.floor_polygon,
-        layout.floor_height,
-        layout.ceiling_height,
-        scene.panorama.camera_height,
+        layout.floor_polygon, layout.floor_height, layout.ceiling_height, camera_height
     )
-    height, corner = float((ceiling - floor).mean()), float(read.corner.max())
     certain = 1.0 if layout.wall_score is None else float(layout.wall_score.mean())
+    height = math.degrees(float((ceiling - floor).mean()))
+    return {"wall_deg": height, "corner": float(read.corner.max()), "wall_score": certain}
+
+
+def _not_indoors(read: LayoutPrediction, scene: Scene) -> tuple[Flag, ...]:
+    """Return the flag for a picture that shows no walls, no corner, or none to be sure of."""
+    signs = room_signs(read, scene.panorama.camera_height)
     least = WEAK_WALL if len(scene.objects.boxes) else WEAK_EMPTY_WALL
-    if height >= LEAST_WALL and corner >= LEAST_CORNER and certain >= least:
+    if (
+        signs["wall_deg"] >= LEAST_WALL_DEG
+        and signs["corner"] >= LEAST_CORNER
+        and signs["wall_score"] >= least
+    ):
         return ()
     text = "the walls are uncertain: this may not be a room, or not an indoor photo"
-    numbers = {"wall_deg": math.degrees(height), "corner": corner, "wall_score": certain}
-    return (Flag("not_indoors", text, numbers),)
+    return (Flag("not_indoors", text, signs),)

@@ -19,12 +19,12 @@ from panoscene.scene import (
     Panorama,
     Relations,
     Scene,
-    relations_from_boxes,
     upright_photo,
 )
 
 from ._flags import photo_flags, scene_flags
 from ._records import Given, Reconstruction
+from ._relations import final_relations, held_relations
 from ._settings import PHOTO
 from ._sphere import sphere_gaps
 from ._stages import Stages
@@ -86,6 +86,26 @@ class Pipeline:
             name: of the scene.
             resolution: of the grid in which meshes are found, for each side of a box.
         """
+        placed = self.place(image, panorama, given=given, name=name)
+        return self.shape(placed, resolution=resolution)
+
+    @torch.inference_mode()
+    def place(
+        self,
+        image: Float[Tensor, "3 height width"],
+        panorama: Panorama | None = None,
+        *,
+        given: Given | None = None,
+        name: str = "",
+    ) -> Reconstruction:
+        """Return the scene that a photo shows, with boxes for all objects: meshes come last.
+
+        Args:
+            image: as in a call.
+            panorama: as in a call.
+            given: as in a call.
+            name: as in a call.
+        """
         clock = _Clock()
         given = given or Given()
         panorama = panorama or Panorama(image.shape[-1], image.shape[-2])
@@ -102,12 +122,24 @@ class Pipeline:
                 objects, relations = self._placed(seen, found, layout, panorama.camera_height)
         initial = Scene(panorama, layout, objects, given.relations or relations, name)
         scene, certificate = self._arranged(initial, clock)
-        if self._stages.shape is not None:
-            with clock("shape"):
-                shapes = self._stages.shape(seen, scene.objects, resolution=resolution)
-                scene = replace(scene, objects=replace(scene.objects, shapes=shapes))
         flags = photo_flags(gaps, tilt) + scene_flags(read, scene)
         return Reconstruction(scene, initial, seen, certificate, read, clock.seconds, flags)
+
+    def shape(self, placed: Reconstruction, *, resolution: int = 64) -> Reconstruction:
+        """Return a placed scene with a mesh for each object, unless it has meshes already.
+
+        Args:
+            placed: by ``place``.
+            resolution: as in a call.
+        """
+        objects = placed.scene.objects
+        if self._stages.shape is None or objects.shapes.mesh:
+            return placed
+        clock = _Clock()
+        with clock("shape"):
+            shapes = self._stages.shape(placed.image, objects, resolution=resolution)
+        scene = replace(placed.scene, objects=replace(objects, shapes=shapes))
+        return replace(placed, scene=scene, timings={**placed.timings, **clock.seconds})
 
     def _levelled(
         self, image: Float[Tensor, "3 rows columns"], panorama: Panorama, given: Given
@@ -161,16 +193,14 @@ class Pipeline:
         return self._stages.context(image, found, layout, camera_height)
 
     def _arranged(self, scene: Scene, clock: "_Clock") -> tuple[Scene, Certificate | None]:
-        """Return the arranged scene with the relations of its boxes."""
-        certificate = None
+        """Return the arranged scene with relations that fit its boxes."""
+        said, certificate = scene.relations, None
         with clock("arrangement"):
             if self._settings is not None:
-                start = scene
-                if scene.relations is None:
-                    start = replace(scene, relations=_relations(scene))
+                start = replace(scene, relations=held_relations(scene))
                 arrangement = arrange(start, self._settings)
                 scene, certificate = arrangement.scene, arrangement.certificate
-            return replace(scene, relations=_relations(scene)), certificate
+            return replace(scene, relations=final_relations(scene, said)), certificate
 
 
 @dataclass(slots=True)
@@ -192,9 +222,3 @@ def _reduced(image: Float[Tensor, "3 height width"]) -> Float[Tensor, "3 rows co
         return image
     mode = "area" if image.shape[-1] > SIZE[1] else "bilinear"
     return torch.nn.functional.interpolate(image[None], size=SIZE, mode=mode)[0]
-
-
-def _relations(scene: Scene) -> Relations:
-    """Return the relations of a scene's boxes, which may stand out of the room by centimetres."""
-    boxes, height = scene.objects.boxes, scene.panorama.camera_height
-    return relations_from_boxes(boxes, scene.layout, height, inside="any_corner")

@@ -5,6 +5,7 @@ from ._boxes_table import objects_from_boxes as objects_from_boxes
 from ._boxes_table import read_box_table as read_box_table
 from ._boxes_table import scene_from_boxes as scene_from_boxes
 from ._boxes_table import write_box_table as write_box_table
+from ._categories import BUILT_IN as BUILT_IN
 from ._categories import CATEGORIES as CATEGORIES
 from ._categories import COMMON_11 as COMMON_11
 from ._categories import MEAN_SIZE as MEAN_SIZE
@@ -25,6 +26,7 @@ from ._files import write_scene as write_scene
 from ._graph import relation_graph as relation_graph
 from ._graph import write_graphml as write_graphml
 from ._images import read_panorama as read_panorama
+from ._openings import built_in as built_in
 from ._photos import relocate_photo as relocate_photo
 from ._photos import upright_photo as upright_photo
 from ._records import Detections as Detections

@@ -18,6 +18,8 @@ CATEGORIES: tuple[str, ...] = (
     "treadmill", "wall_clock", "wall_mounted_tv", "washer", "window",
 )  # fmt: skip
 """Names of the 57 categories in index order, which is alphabetical."""
+BUILT_IN: tuple[str, ...] = ("door", "window")
+"""Categories that stand in walls, so partly behind their surface."""
 
 _INDEX = {name: index for index, name in enumerate(CATEGORIES)}
 

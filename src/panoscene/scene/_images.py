@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float
 from PIL import Image, ImageOps, UnidentifiedImageError
 from torch import Tensor
+from torch.nn import functional
 
 from ._checks import ASPECT_TOLERANCE
 from ._errors import PanoramaError
@@ -22,7 +23,7 @@ FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP")
 
 MIN_WIDTH, MIN_HEIGHT = 64, 32
 MAX_PIXELS = 150_000_000
-"""16384 x 8192 fits; the decoded picture takes 12 bytes a pixel."""
+"""16384 x 8192 fits; the decoded picture takes 3 bytes a pixel, and 12 where it is not reduced."""
 
 _EXIF_ORIENTATION = 0x0112
 # what Pillow's decoders raise on damaged files
@@ -31,7 +32,7 @@ _DAMAGE = (OSError, SyntaxError, ValueError, EOFError, IndexError, KeyError, Typ
 
 
 def read_panorama(
-    path: str | os.PathLike[str], *, camera_height: float = 1.6
+    path: str | os.PathLike[str], *, camera_height: float = 1.6, columns: int | None = None
 ) -> tuple[Float[Tensor, "3 height width"], Panorama]:
     """Return the picture as RGB floats in [0, 1], and what is known about it.
 
@@ -42,23 +43,33 @@ def read_panorama(
         - transparent pixels are composited over black: they are pixels that nobody saw
         - the EXIF orientation is applied, and then the picture must be 2:1 within 1 %
         - the first picture of a file with several is read
-        - ``Panorama.file`` is the bare file name: a scene file is expected next to the photo
+        - ``Panorama.file`` is the bare file name: a scene file is expected next to the photo; its
+          size is that of the file
+
+    Args:
+        path: of the picture.
+        camera_height: metres above the floor.
+        columns: as many are enough: of a picture with at least twice as many, each pixel is the
+            mean of two by two, three by three ... before it takes 12 bytes; None keeps all.
 
     Raises:
         PanoramaError: The file is missing, damaged, truncated or not of a known format, or the
             picture is not 2:1, below 64 x 32, or above 150 million pixels.
-        ValueError: The camera height is not a positive number.
+        ValueError: The camera height or the columns are not positive.
     """
     if not 0 < camera_height < math.inf:
         raise ValueError(f"camera_height: expected metres above 0, found {camera_height}")
+    if columns is not None and columns < 1:
+        raise ValueError(f"columns: expected at least 1, found {columns}")
     file = os.fspath(path)
     with warnings.catch_warnings():
         # Pillow warns about large pictures and odd metadata; here both are errors or harmless
         warnings.simplefilter("ignore")
         try:
             with Image.open(path, formats=FORMATS) as picture:
-                _check_size(_upright_size(picture), file)
-                image = _rgb(picture, file)
+                width, height = _upright_size(picture)
+                _check_size((width, height), file)
+                image = _rgb(picture, file, 1 if columns is None else max(width // columns, 1))
         except PanoramaError:
             raise
         except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
@@ -72,7 +83,6 @@ def read_panorama(
             raise PanoramaError(file, reason) from None
         except _DAMAGE as error:
             raise PanoramaError(file, f"the picture is damaged or truncated: {error}") from error
-    height, width = image.shape[1:]
     return image, Panorama(width, height, camera_height, Path(file).name)
 
 
@@ -99,19 +109,22 @@ def _too_large(found: str) -> str:
     return f"found {found} pixels, expected at most {MAX_PIXELS // 1_000_000} million"
 
 
-def _rgb(picture: Image.Image, file: str) -> Float[Tensor, "3 height width"]:
+def _rgb(picture: Image.Image, file: str, factor: int) -> Float[Tensor, "3 height width"]:
     picture = ImageOps.exif_transpose(picture)
     if picture.mode.startswith("I") or picture.mode == "F":
-        return _grey(picture, file)
+        return _grey(picture, file, factor)
     if picture.has_transparency_data:
         seen = picture.convert("RGBA")
         picture = Image.alpha_composite(Image.new("RGBA", seen.size, (0, 0, 0, 255)), seen)
+    picture = picture.convert("RGB")
+    if factor > 1:
+        picture = picture.reduce(factor)
     # bytes are reordered before they become four times as large
-    pixels = torch.as_tensor(np.array(picture.convert("RGB"))).permute(2, 0, 1).contiguous()
+    pixels = torch.as_tensor(np.array(picture)).permute(2, 0, 1).contiguous()
     return pixels.float().div_(255)
 
 
-def _grey(picture: Image.Image, file: str) -> Float[Tensor, "3 height width"]:
+def _grey(picture: Image.Image, file: str, factor: int) -> Float[Tensor, "3 height width"]:
     """Return greyscale of more than 8 bits; wide integers hold 16-bit values in practice."""
     values = torch.as_tensor(np.array(picture).astype(np.float32))
     largest = 1.0 if picture.mode == "F" else 65535.0
@@ -119,4 +132,6 @@ def _grey(picture: Image.Image, file: str) -> Float[Tensor, "3 height width"]:
     if not (low >= 0 and high <= largest):
         reason = f"found values from {low:g} to {high:g}, expected 0 to {largest:g}"
         raise PanoramaError(file, reason)
+    if factor > 1:
+        values = functional.avg_pool2d(values[None], factor, ceil_mode=True)[0]
     return (values / largest).repeat(3, 1, 1)

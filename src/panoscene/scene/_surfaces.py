@@ -1,6 +1,6 @@
 """Scenes as triangles: every object, wall, floor and ceiling in the world frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import shapely
@@ -11,6 +11,7 @@ from torch import Tensor
 from panoscene.geometry import OrientedBoxes
 
 from ._numbers import numbers_from_tensor
+from ._openings import opened_wall, wall_openings
 from ._records import Layout, Mesh, Objects, Scene
 from ._triples import object_names, wall_names
 
@@ -116,11 +117,25 @@ def room_surfaces(layout: Layout) -> tuple[Surface, ...]:
 def scene_surfaces(scene: Scene) -> tuple[Surface, ...]:
     """Return all surfaces of a scene: the room's, then one for each object.
 
+    Walls are open where doors and windows stand in them, and where other things have sunk in.
+
     Raises:
         ValueError: the floor polygon is not valid.
     """
-    count = len(scene.objects.boxes)
-    return room_surfaces(scene.layout) + tuple(object_surface(scene, k) for k in range(count))
+    layout = scene.layout
+    floor, ceiling, *walls = room_surfaces(layout)
+    opened = [
+        _opened(wall, layout, openings) if len(openings) else wall
+        for wall, openings in zip(walls, wall_openings(scene), strict=True)
+    ]
+    objects = (object_surface(scene, k) for k in range(len(scene.objects.boxes)))
+    return (floor, ceiling, *opened, *objects)
+
+
+def _opened(wall: Surface, layout: Layout, openings: Float[Tensor, "openings 4"]) -> Surface:
+    start, end = wall.vertices[0, :2], wall.vertices[1, :2]
+    vertices, faces = opened_wall(start, end, layout.floor_height, layout.ceiling_height, openings)
+    return replace(wall, vertices=vertices, faces=faces)
 
 
 def _polygon_triangles(corners: Float[Tensor, "corners 2"]) -> Int64[Tensor, "faces 3"]:

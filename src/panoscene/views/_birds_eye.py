@@ -30,6 +30,7 @@ from panoscene.views._panels import (
     natural_size,
     number_objects,
 )
+from panoscene.views._pieces import TOLERANCE
 
 
 def draw_birds_eye(
@@ -41,6 +42,7 @@ def draw_birds_eye(
     reference: Scene | None = None,
     relations: bool = True,
     size_px: tuple[int, int] | None = None,
+    tolerance: float = TOLERANCE,
 ) -> None:
     """Write a PNG of the room from above.
 
@@ -49,8 +51,8 @@ def draw_birds_eye(
     numbers with a key where they do not, an object's number being its place in the scene, from 0
     as in names such as chair_4; arrows at the border with name and distance from the room for
     objects that are far outside; the camera, a scale and the direction of the photo's
-    centre. Collisions and parts outside the room, both from one centimetre, are hatched in red;
-    floors and ceilings that are pierced cannot be seen from above.
+    centre. Collisions and parts outside the room, by default from one centimetre, are hatched in
+    red; floors and ceilings that are pierced cannot be seen from above.
 
     Args:
         scene: what to draw.
@@ -62,6 +64,7 @@ def draw_birds_eye(
             that follow from its boxes if it has none.
         size_px: width and height of the picture; by default 1200 pixels wide and as high as the
             room needs, at most 1000.
+        tolerance: metres of overlap, or of sticking out of the room, from which they are shown.
 
     Convention:
         - the view is turned, by at most 45 degrees, so that walls run along the page's edges,
@@ -78,6 +81,7 @@ def draw_birds_eye(
         reference=reference,
         relations=relations,
         size_px=size_px,
+        tolerance=tolerance,
     )
 
 
@@ -89,6 +93,7 @@ def draw_comparison(
     reference: Scene | None = None,
     relations: bool = True,
     size_px: tuple[int, int] | None = None,
+    tolerance: float = TOLERANCE,
 ) -> None:
     """Write a PNG of several rooms from above, side by side at one scale, such as before and after.
 
@@ -100,6 +105,7 @@ def draw_comparison(
         relations: whether to draw contacts.
         size_px: width and height of the whole picture; by default 1600 pixels wide (1200
             for one scene) and as high as the rooms need, at most 1000.
+        tolerance: metres of overlap, or of sticking out of the room, from which they are shown.
 
     Convention:
         - as in ``draw_birds_eye``; an object has the same number in every picture
@@ -115,7 +121,7 @@ def draw_comparison(
     if min(size_px) < 1 or max(size_px) > LARGEST:
         raise ValueError(f"size_px: found {size_px}, expected numbers from 1 to {LARGEST}")
     page = Page(*size_px)
-    panels = make_panels(scenes, reference, relations, size_px)
+    panels = make_panels(scenes, reference, relations, size_px, tolerance)
     names = [place_names(panel.near, page.label_size) for panel in panels]
     numbers = number_objects(panels, names)
     pointers = [_place_pointers(page, *parts) for parts in zip(panels, numbers, strict=True)]

@@ -4,7 +4,6 @@ from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import shapely
 from jaxtyping import Float
@@ -100,6 +99,8 @@ class Canvas:
 @lru_cache
 def font(size: float, *, bold: bool = False) -> ImageFont.FreeTypeFont:
     """Return the typeface of all pictures, which comes with matplotlib."""
+    import matplotlib as mpl  # noqa: PLC0415 - renderings need none of it
+
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(str(Path(mpl.get_data_path()) / "fonts" / "ttf" / name), size)
 

@@ -15,7 +15,7 @@ from panoscene.views._curves import Curve, overlay_curves
 from panoscene.views._overlay_labels import Placed, Target, place_labels
 from panoscene.views._page import Page
 from panoscene.views._pictures import fitted_pixels, plain_room
-from panoscene.views._pieces import colliding_pairs
+from panoscene.views._pieces import TOLERANCE, colliding_pairs
 
 USUAL_WIDTH, LEAST_WIDTH, MOST_WIDTH = 2048, 64, 16384
 """Pixels."""
@@ -33,6 +33,7 @@ def draw_overlay(
     reference: Scene | None = None,
     labels: bool = True,
     width_px: int | None = None,
+    tolerance: float = TOLERANCE,
 ) -> None:
     """Write a PNG of the panorama with the scene drawn on it.
 
@@ -51,6 +52,7 @@ def draw_overlay(
         labels: whether to write names.
         width_px: width of the picture, twice its height; by default that of the photo, at most
             2048, and 2048 without a photo.
+        tolerance: metres of overlap from which boxes collide.
 
     Raises:
         ValueError: boxes or corners that are not finite, or a width that is odd or not between
@@ -58,7 +60,10 @@ def draw_overlay(
     """
     if width_px is None:
         width_px = USUAL_WIDTH if image is None else min(image.shape[2] // 2 * 2, USUAL_WIDTH)
-    overlay_page(scene, width_px, image=image, reference=reference, labels=labels).save(path)
+    page = overlay_page(
+        scene, width_px, image=image, reference=reference, labels=labels, tolerance=tolerance
+    )
+    page.save(path)
 
 
 def overlay_page(
@@ -68,6 +73,7 @@ def overlay_page(
     image: Float[Tensor, "3 height width"] | None = None,
     reference: Scene | None = None,
     labels: bool = True,
+    tolerance: float = TOLERANCE,
 ) -> Page:
     """Return the overlay as a page, for ``draw_overlay`` and for sheets."""
     if width % 2 or not LEAST_WIDTH <= width <= MOST_WIDTH:
@@ -85,7 +91,7 @@ def overlay_page(
     _draw_layout(page, curves, unit)
     if reference is not None:
         _draw_reference(page, scene, reference, unit)
-    pairs = colliding_pairs(scene.objects.boxes)
+    pairs = colliding_pairs(scene.objects.boxes, tolerance)
     colliding = set(pairs.flatten().tolist())
     _draw_objects(page, scene, curves, colliding, unit)
     if labels:

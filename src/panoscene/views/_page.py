@@ -1,3 +1,5 @@
+# ruff: noqa: PLC0415
+# The imports stand inside: who renders or writes pages for browsers does not wait for matplotlib.
 """A sheet of paper measured in pixels: shapes and text in paint order, saved as a PNG."""
 
 import os
@@ -9,18 +11,6 @@ from typing import Any, Literal
 import numpy as np
 import shapely
 from jaxtyping import UInt8
-from matplotlib import patheffects
-from matplotlib.artist import Artist
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
-from matplotlib.image import FigureImage
-from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path as Outline
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox, IdentityTransform
 
 from panoscene.scene import write_atomically
 from panoscene.style import FONT, INK, LABEL, PAPER
@@ -40,15 +30,20 @@ class Page:
     """
 
     def __init__(self, width: int, height: int) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
         self.width, self.height = width, height
         self._figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor=PAPER)
         self._canvas = FigureCanvasAgg(self._figure)
-        self._clip: Bbox | None = None
+        self._clip: Any = None
         self._drawn = 0
         self._label_sizes: dict[str, tuple[float, float]] = {}
 
     def clip(self, bounds: tuple[float, float, float, float] | None) -> None:
         """Keep what follows inside (left, bottom, right, top), or everywhere with None."""
+        from matplotlib.transforms import Bbox
+
         self._clip = None if bounds is None else Bbox.from_extents(*bounds)
 
     def area(
@@ -63,6 +58,9 @@ class Page:
         alpha: float = 1.0,
     ) -> None:
         """Draw polygons with their holes; other parts of the geometry are ignored."""
+        from matplotlib.patches import PathPatch
+        from matplotlib.path import Path as Outline
+
         for polygon in shapely.get_parts(shape):
             if polygon.geom_type != "Polygon" or polygon.is_empty:
                 continue
@@ -91,6 +89,8 @@ class Page:
         cap: Literal["butt", "round"] = "butt",
     ) -> None:
         """Draw a line through points."""
+        from matplotlib.lines import Line2D
+
         x, y = np.asarray(points, dtype=float).T
         self._add(
             Line2D(
@@ -116,6 +116,8 @@ class Page:
         """Draw many lines of one kind, each through the rows of an array, with round ends."""
         if not curves:
             return
+        from matplotlib.collections import LineCollection
+
         style = "-" if dashes is None else (0, tuple(d / width for d in dashes))
         self._add(
             LineCollection(
@@ -144,6 +146,9 @@ class Page:
 
     def image(self, pixels: UInt8[np.ndarray, "height width 3"], x: int, y: int) -> None:
         """Lay a picture on the page, pixel on pixel, with its lower left corner at (x, y)."""
+        from matplotlib.image import FigureImage
+        from matplotlib.transforms import IdentityTransform
+
         picture = FigureImage(self._figure, offsetx=x, offsety=y, origin="upper")
         picture.set_data(pixels)
         self._drawn += 1
@@ -171,6 +176,9 @@ class Page:
         halo: str | None = None,
     ) -> None:
         """Write text whose middle is at height y; ``halo`` is the colour of a soft rim."""
+        from matplotlib import patheffects
+        from matplotlib.text import Text
+
         artist = Text(
             x,
             y,
@@ -228,7 +236,9 @@ class Page:
         self._canvas.print_png(buffer, metadata={"Software": None}, pil_kwargs=options)
         write_atomically(Path(path), buffer.getvalue())
 
-    def _add(self, artist: Artist) -> None:
+    def _add(self, artist: Any) -> None:
+        from matplotlib.transforms import IdentityTransform
+
         self._drawn += 1
         artist.set_zorder(self._drawn)
         # no axes: coordinates are pixels of the canvas
@@ -238,5 +248,7 @@ class Page:
         artist.set_clip_on(self._clip is not None)
 
 
-def _font(size: float, bold: bool) -> FontProperties:
+def _font(size: float, bold: bool) -> Any:
+    from matplotlib.font_manager import FontProperties
+
     return FontProperties(family=FONT, size=size * _POINTS, weight="bold" if bold else "normal")

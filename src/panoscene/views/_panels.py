@@ -9,7 +9,7 @@ from panoscene.scene import Scene
 from panoscene.views._far import far_objects
 from panoscene.views._key import longest_key
 from panoscene.views._labels import Label
-from panoscene.views._pieces import Bounds, Plan, View, make_plan, scene_bounds
+from panoscene.views._pieces import TOLERANCE, Bounds, Plan, View, make_plan, scene_bounds
 
 KEY_WIDTH = 256.0
 HEADER, FOOTER = 74.0, 54.0
@@ -46,6 +46,7 @@ def make_panels(
     reference: Scene | None,
     relations: bool,
     size_px: tuple[int, int],
+    tolerance: float = TOLERANCE,
 ) -> list[Panel]:
     """Return the panels: equally wide, rooms in their middle, at one scale and turn."""
     width = (size_px[0] - KEY_WIDTH) / len(scenes)
@@ -61,7 +62,7 @@ def make_panels(
         x, y = scale * (high_x - low_x) / 2, scale * (high_y - low_y) / 2
         offset = middle[0] - x - scale * low_x, middle[1] - y - scale * low_y
         view = View(turn, scale, offset)
-        plan = make_plan(scene, view, relations=relations)
+        plan = make_plan(scene, view, relations=relations, tolerance=tolerance)
         content = middle[0] - x, middle[1] - y, middle[0] + x, middle[1] + y
         far = far_objects(plan, content)
         # the line to an object out of sight would cross the room

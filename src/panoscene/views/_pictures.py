@@ -3,13 +3,13 @@
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8
-from matplotlib.colors import to_rgb
 from PIL import Image
 from torch import Tensor
 
 from panoscene.geometry import wall_distance
 from panoscene.scene import Layout
 from panoscene.style import FLOOR
+from panoscene.views._model import rgb
 
 _CEILING, _WALL = "#dfe3e8", "#c9ced6"
 """Of a room that nobody photographed: pale, so that lines and labels stand out."""
@@ -46,5 +46,5 @@ def plain_room(
     low = np.arctan2(layout.floor_height - camera_height, distance)
     high = np.arctan2(layout.ceiling_height - camera_height, distance)
     surface = 1 + (lat[:, None] > high).astype(int) - (lat[:, None] < low)
-    colours = [[round(255 * part) for part in to_rgb(name)] for name in (FLOOR, _WALL, _CEILING)]
+    colours = [[round(255 * part) for part in rgb(name)] for name in (FLOOR, _WALL, _CEILING)]
     return np.array(colours, dtype=np.uint8)[surface]

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float, Int64
 
 from panoscene.geometry import OrientedBoxes, box_footprint, penetration_depth, wall_normals
-from panoscene.scene import CATEGORIES, Relations, Scene, relations_from_boxes
+from panoscene.scene import BUILT_IN, CATEGORIES, Relations, Scene, relations_from_boxes
 from panoscene.style import MOST_WALL, NO_FRONT, OVERHEAD, WALL_THICKNESS
 
 TOLERANCE = 0.01
@@ -19,8 +19,6 @@ FAR = 2.0
 no line is drawn between two that should touch: it would cross what has nothing to do with it."""
 IN_WALL = 0.5
 """Metres behind the surface of a wall in which doors and windows are at home."""
-BUILT_IN = ("door", "window")
-"""Categories that stand in walls."""
 Bounds = tuple[float, float, float, float]
 
 
@@ -128,7 +126,7 @@ def scene_bounds(scenes: Sequence[Scene], turn: float) -> Bounds:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def make_plan(scene: Scene, view: View, *, relations: bool) -> Plan:
+def make_plan(scene: Scene, view: View, *, relations: bool, tolerance: float = TOLERANCE) -> Plan:
     """Return the shapes of a scene on the page.
 
     Args:
@@ -136,15 +134,16 @@ def make_plan(scene: Scene, view: View, *, relations: bool) -> Plan:
         view: where the world lies on the page.
         relations: whether contacts are wanted; a scene without relations gets those that follow
             from its boxes.
+        tolerance: metres of overlap, or of sticking out of the room, from which they are shown.
     """
     boxes = scene.objects.boxes
     floor = shapely.Polygon(view.page(scene.layout.floor_polygon.double().numpy(force=True)))
     thickness = min(WALL_THICKNESS * view.scale, MOST_WALL)
     corners = view.page(_footprints(boxes))
     footprints = [shapely.Polygon(corner) for corner in corners]
-    pairs = colliding_pairs(boxes)
+    pairs = colliding_pairs(boxes, tolerance)
     colliding = set(pairs.flatten().tolist())
-    grown = floor.buffer(TOLERANCE * view.scale, join_style="mitre")
+    grown = floor.buffer(tolerance * view.scale, join_style="mitre")
     with_walls = floor.buffer(IN_WALL * view.scale, join_style="mitre")
     categories = [CATEGORIES[k] for k in scene.objects.category.tolist()]
     bottom = (boxes.centre[:, 2] - boxes.size[:, 2] / 2 - scene.layout.floor_height).tolist()
@@ -184,10 +183,12 @@ def _footprints(boxes: OrientedBoxes) -> Float[np.ndarray, "n 4 2"]:
     return box_footprint(boxes).double().numpy(force=True)
 
 
-def colliding_pairs(boxes: OrientedBoxes) -> Int64[np.ndarray, "pairs 2"]:
-    """Return the pairs of objects that overlap by more than a centimetre."""
+def colliding_pairs(
+    boxes: OrientedBoxes, tolerance: float = TOLERANCE
+) -> Int64[np.ndarray, "pairs 2"]:
+    """Return the pairs of objects that overlap by more than some metres."""
     depth = penetration_depth(boxes[:, None], boxes[None, :]).triu(diagonal=1)
-    return (depth > TOLERANCE).nonzero().numpy(force=True)
+    return (depth > tolerance).nonzero().numpy(force=True)
 
 
 def _outside(

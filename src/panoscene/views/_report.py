@@ -18,6 +18,7 @@ from panoscene import __version__
 from panoscene.arrange import Certificate
 from panoscene.scene import Relations, Scene, relations_from_boxes, write_atomically
 from panoscene.views._birds_eye import describe_room
+from panoscene.views._pieces import TOLERANCE
 from panoscene.views._report_colours import palette_style
 from panoscene.views._report_data import report_data
 from panoscene.views._report_photo import photo_address
@@ -37,6 +38,7 @@ def write_report(
     timings: Mapping[str, float] | None = None,
     title: str = "",
     notes: Sequence[str] = (),
+    tolerance: float = TOLERANCE,
 ) -> None:
     """Write a page that shows a scene in a panorama, in 3D, from above and in tables.
 
@@ -56,6 +58,7 @@ def write_report(
         timings: seconds by the name of the stage, in their order.
         title: heading; the scene's name when empty.
         notes: sentences below the heading.
+        tolerance: metres of overlap, or of sticking out of the room, from which the tables tell.
 
     Raises:
         ValueError: boxes, corners or timings that are not finite, a floor polygon that is not
@@ -65,7 +68,7 @@ def write_report(
     timings = {} if timings is None else timings
     _check(scene, before, timings)
     relations, relations_caption = _relations(scene)
-    data = report_data(scene, relations, before, certificate, timings)
+    data = report_data(scene, relations, before, certificate, timings, tolerance=tolerance)
     title = title or scene.name or "Room"
     style = palette_style() + _part("report.css")
     script = _part("report.js")

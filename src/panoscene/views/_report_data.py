@@ -16,6 +16,7 @@ from panoscene.geometry import (
     signed_distance_to_polygon,
 )
 from panoscene.scene import (
+    BUILT_IN,
     CATEGORIES,
     Layout,
     Mesh,
@@ -26,7 +27,7 @@ from panoscene.scene import (
     room_surfaces,
 )
 from panoscene.style import GROUP_COLOURS, NO_FRONT, WALL_THICKNESS, group_of, words
-from panoscene.views._pieces import BUILT_IN, IN_WALL, TOLERANCE
+from panoscene.views._pieces import IN_WALL, TOLERANCE
 from panoscene.views._report_colours import PALETTES, category_colour
 
 Values = dict[str, object]
@@ -48,14 +49,16 @@ def report_data(
     before: Scene | None,
     certificate: Certificate | None,
     timings: Mapping[str, float],
+    *,
+    tolerance: float = TOLERANCE,
 ) -> Values:
     """Return everything that the page's scripts show, as plain values."""
     related = Scene(scene.panorama, scene.layout, scene.objects, relations, scene.name)
     categories = [CATEGORIES[k] for k in scene.objects.category.tolist()]
     worn = {group_of(category) for category in categories}
-    faults = {"after": box_faults(scene, scene.relations)}
+    faults = {"after": box_faults(scene, scene.relations, tolerance)}
     if before is not None:
-        faults["before"] = box_faults(before, scene.relations)
+        faults["before"] = box_faults(before, scene.relations, tolerance)
     return {
         "camera_height": scene.panorama.camera_height,
         "layout": _layout(scene),
@@ -71,8 +74,10 @@ def report_data(
     }
 
 
-def box_faults(scene: Scene, relations: Relations | None) -> list[str | None]:
-    """Return what is physically wrong with each object, from one centimetre, or None.
+def box_faults(
+    scene: Scene, relations: Relations | None, tolerance: float = TOLERANCE
+) -> list[str | None]:
+    """Return what is physically wrong with each object, from some metres on, or None.
 
     Objects that do not belong in the room by their inside_room score may be outside it, and doors
     and windows in its walls.
@@ -90,8 +95,8 @@ def box_faults(scene: Scene, relations: Relations | None) -> list[str | None]:
     faults: list[str | None] = []
     columns = zip(deepest.tolist(), partner.tolist(), outside.tolist(), strict=True)
     for overlap, other, beyond in columns:
-        parts = [f"overlaps {names[other]} by {100 * overlap:.0f} cm"] * (overlap > TOLERANCE)
-        parts += [f"{100 * beyond:.0f} cm outside the room"] * (beyond > TOLERANCE)
+        parts = [f"overlaps {names[other]} by {100 * overlap:.0f} cm"] * (overlap > tolerance)
+        parts += [f"{100 * beyond:.0f} cm outside the room"] * (beyond > tolerance)
         faults.append(", ".join(parts) or None)
     return faults
 

@@ -1,0 +1,79 @@
+"""The process that draws: answers, errors, and how it ends."""
+
+import operator
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import BrokenExecutor
+from pathlib import Path
+
+import pytest
+
+from panoscene.cli._artist import artist
+
+
+def test_tasks_are_done_in_another_process(capfd: pytest.CaptureFixture[str]) -> None:
+    with artist("json") as drawing:
+        process = drawing.submit(os.getpid)
+        assert list(drawing.map(operator.mul, (2, 3), (5, 7))) == [10, 21]
+        # what a library prints is not among the results of the command
+        drawing.submit(os.write, 1, b"drawing").result(60)
+        assert process.result(60) != os.getpid()
+    assert capfd.readouterr() == ("", "drawing")
+
+
+def test_what_a_task_raises_is_raised_here() -> None:
+    with artist() as drawing:
+        with pytest.raises(ZeroDivisionError):
+            drawing.submit(operator.truediv, 1, 0).result(60)
+        with pytest.raises(FileNotFoundError) as absent:
+            drawing.submit(os.stat, "nowhere").result(60)
+        assert absent.value.filename == "nowhere"
+        assert drawing.submit(operator.neg, 1).result(60) == -1
+
+
+def test_a_process_that_dies_is_noticed() -> None:
+    with artist() as drawing:
+        with pytest.raises(BrokenExecutor):
+            drawing.submit(os._exit, 3).result(60)
+        with pytest.raises(BrokenExecutor):
+            drawing.submit(os.getpid).result(60)
+
+
+def test_leaving_gives_up_what_has_not_begun() -> None:
+    with artist() as drawing:
+        process = drawing.submit(os.getpid).result(60)
+        tasks = [drawing.submit(time.sleep, 0.2) for _ in range(50)]
+    assert tasks[-1].cancelled()
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_it_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
+    code = f"""
+import os, signal
+from pathlib import Path
+from panoscene.cli._artist import artist
+with artist() as drawing:
+    Path({str(tmp_path / "pid")!r}).write_text(str(drawing.submit(os.getpid).result()))
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    subprocess.run([sys.executable, "-c", code], check=False)
+    process = int((tmp_path / "pid").read_text())
+    for _ in range(600):
+        if not _is_running(process):
+            return
+        time.sleep(0.1)
+    pytest.fail("the process that draws goes on alone")
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process}/stat")
+    # nobody may be there to collect what is left of it
+    return not (state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z")

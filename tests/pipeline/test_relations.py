@@ -1,0 +1,105 @@
+"""Relations of a finished scene: those of its boxes, and contacts that they miss by little."""
+
+from dataclasses import fields, replace
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from torch import Tensor
+
+from panoscene.geometry import OrientedBoxes
+from panoscene.pipeline import Pipeline
+from panoscene.pipeline._relations import CONTACTS, box_relations, final_relations
+from panoscene.scene import Layout, Panorama, Relations, Scene, objects_from_boxes
+
+from .conftest import Knowing
+from .test_context_stage import Context
+
+SQUARE = torch.tensor([[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]])
+
+
+def scene_of(gap: float, lift: float = 0.0) -> Scene:
+    """Two cubes of 1 m in a row: ``gap`` between a wall, the first, and the second."""
+    centre = torch.tensor([[2.5 - gap, 0.0, 0.5 + lift], [1.5 - 2 * gap, 0.0, 0.5 + lift]])
+    boxes = OrientedBoxes(centre, torch.ones(2, 3), torch.zeros(2))
+    objects = objects_from_boxes(boxes, ["chair", "table"], camera_height=1.6)
+    return Scene(Panorama(1024, 512), Layout(SQUARE), objects)
+
+
+def sure(scene: Scene, chance: float) -> Relations:
+    """Everything is as probable as ``chance``, but the yaws."""
+    had = box_relations(scene)
+    said = {name: torch.full_like(getattr(had, name), chance) for name in CONTACTS}
+    return replace(had, **said)
+
+
+def test_without_a_network_they_are_those_of_the_boxes() -> None:
+    scene = scene_of(0.05)
+    found, had = final_relations(scene, None), box_relations(scene)
+    assert all(torch.equal(getattr(found, f.name), getattr(had, f.name)) for f in fields(had))
+    assert found.touching.tolist() == [[0.0, 1.0], [1.0, 0.0]]
+    assert found.touching_wall[0].tolist() == [0.0, 1.0, 0.0, 0.0]
+
+
+def test_a_likely_contact_over_a_small_gap_is_as_probable_as_the_network_says() -> None:
+    scene = scene_of(0.2, lift=0.2)
+    found = final_relations(scene, sure(scene, 0.8))
+    assert torch.allclose(found.touching, torch.tensor([[0.0, 0.8], [0.8, 0.0]]))
+    assert torch.allclose(found.touching_wall[0], torch.tensor([0.0, 0.8, 0.0, 0.0]))
+    assert torch.allclose(found.on_floor, torch.tensor(0.8))
+    assert not found.under_ceiling.any()
+
+
+@pytest.mark.parametrize(("gap", "chance"), [(0.2, 0.5), (0.2, 0.3), (0.35, 0.99)])
+def test_doubtful_or_distant_contacts_do_not_hold(gap: float, chance: float) -> None:
+    scene = scene_of(gap, lift=gap)
+    found = final_relations(scene, sure(scene, chance))
+    assert not any(getattr(found, name).any() for name in CONTACTS)
+
+
+def test_what_the_boxes_have_holds_whatever_the_network_says() -> None:
+    scene = scene_of(0.02)
+    found = final_relations(scene, sure(scene, 0.0))
+    assert torch.equal(found.touching, box_relations(scene).touching)
+    assert torch.equal(found.on_floor, torch.ones(2))
+
+
+def test_an_object_outside_the_room_touches_no_wall() -> None:
+    scene = scene_of(-1.2)
+    found = final_relations(scene, sure(scene, 0.99))
+    assert not found.inside_room.any()
+    assert not found.touching_wall.any()
+
+
+@given(st.floats(-0.4, 0.6), st.floats(0.0, 1.0))
+def test_they_are_probabilities_and_never_below_the_boxes(gap: float, chance: float) -> None:
+    scene = scene_of(gap)
+    found, had = final_relations(scene, sure(scene, chance)), box_relations(scene)
+    for field in fields(had):
+        score = getattr(found, field.name)
+        assert bool((score >= getattr(had, field.name)).all())
+        assert bool((score <= 1).all())
+
+
+def test_the_pipeline_gives_them(truth: Scene, image: Tensor, knowing: Knowing) -> None:
+    said = sure(truth, 0.9)
+    pipeline = Pipeline(knowing.stages(context=Context(truth, said), shape=None), settings=None)
+    scene = pipeline(image, truth.panorama).scene
+    wanted = final_relations(replace(scene, relations=None), said)
+    assert scene.relations is not None
+    assert torch.equal(scene.relations.touching, wanted.touching)
+
+
+@pytest.mark.parametrize(("category", "stays"), [("window", True), ("chest", False)])
+def test_walls_let_be_what_stands_in_them(category: str, stays: bool, image: Tensor) -> None:
+    boxes = OrientedBoxes(
+        torch.tensor([[3.05, 0.0, 1.5]]), torch.tensor([[0.3, 1.2, 1.0]]), torch.zeros(1)
+    )
+    objects = objects_from_boxes(boxes, [category], camera_height=1.6)
+    scene = Scene(Panorama(1024, 512), Layout(SQUARE), objects)
+    result = Pipeline(Knowing(scene).stages(shape=None))(image, scene.panorama)
+    moved = float(boxes.centre[0, 0] - result.scene.objects.boxes.centre[0, 0])
+    assert moved < 0.05 if stays else moved > 0.1
+    assert result.scene.relations is not None
+    assert float(result.scene.relations.inside_room[0]) == 1
