@@ -4,8 +4,9 @@
 
 RUN is what ``panoscene eval reconstruct DATA -o RUN`` wrote. Panoramas are ranked by the mean of
 the layout's 3D IoU and the F1 of objects at an oriented 3D IoU of 0.15; the ten are spread evenly
-over the ranking, so they show the good, the usual and the bad. Pictures go into
-docs/images/results, what is known of each into docs/images/results/panoramas.json.
+over the ranking, so they show the good, the usual and the bad. The second of them is shown from
+every side, too. Pictures go into docs/images/results, what is known of each into panoramas.json
+there.
 """
 
 import argparse
@@ -20,13 +21,21 @@ from PIL import Image
 from panoscene.eval import PREDICTIONS, TARGETS, layout_record, match_objects
 from panoscene.scene import Scene, read_scene, upright_photo, write_atomically
 from panoscene.synth.dataset import PanoramaItem, open_dataset
-from panoscene.views import draw_birds_eye, draw_overlay
+from panoscene.views import (
+    SheetRow,
+    default_view,
+    draw_birds_eye,
+    draw_overlay,
+    draw_sheet,
+    render_panorama,
+    render_view,
+)
 
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "images" / "results"
 ROW = "full"
 TEN, WORST = 10, 5
 SPLITS = ("test-seen", "test-unseen")
-HEIGHT = 300
+HEIGHT, SHEET_HEIGHT = 300, 850
 LARGEST = 250_000
 """Bytes that one committed file may have."""
 
@@ -74,6 +83,9 @@ def main() -> None:
             for x in some
         ]
         save(rows, OUTPUT / f"{name}.webp")
+    second = ten[1].name
+    found = read_scene(choice.run / PREDICTIONS / ROW / f"{second}.json")
+    save([every_side(items[second], found)], OUTPUT / "every-side.webp")
     facts = {"ten": [asdict(x) for x in ten], "worst": [asdict(x) for x in worst]}
     write_atomically(OUTPUT / "panoramas.json", json.dumps(facts, indent=2) + "\n")
 
@@ -115,18 +127,36 @@ def picture(item: PanoramaItem, found: Scene) -> Image.Image:
     return row
 
 
-def opened(file: Path) -> Image.Image:
+def every_side(item: PanoramaItem, found: Scene) -> Image.Image:
+    """Return photo, prediction on it, from above, from outside and from the camera."""
+    image = upright_photo(item.image(), found.panorama)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "sheet.png"
+        row = SheetRow(
+            item.name,
+            found,
+            image=image,
+            rendering=render_panorama(found),
+            view=render_view(found, default_view(found)),
+        )
+        draw_sheet([row], file, labels=True)
+        return opened(file, SHEET_HEIGHT)
+
+
+def opened(file: Path, height: int = HEIGHT) -> Image.Image:
     """Return a picture at the height of a row."""
     with Image.open(file) as picture:
-        width = round(picture.width * HEIGHT / picture.height)
-        return picture.convert("RGB").resize((width, HEIGHT), Image.Resampling.LANCZOS)
+        width = round(picture.width * height / picture.height)
+        return picture.convert("RGB").resize((width, height), Image.Resampling.LANCZOS)
 
 
 def save(rows: list[Image.Image], path: Path) -> None:
     """Write rows below each other, as well as the size of a file allows."""
-    page = Image.new("RGB", (max(row.width for row in rows), HEIGHT * len(rows)), "white")
-    for k, row in enumerate(rows):
-        page.paste(row, (0, k * HEIGHT))
+    size = max(row.width for row in rows), sum(row.height for row in rows)
+    page, top = Image.new("RGB", size, "white"), 0
+    for row in rows:
+        page.paste(row, (0, top))
+        top += row.height
     for quality in range(80, 20, -10):
         page.save(path, quality=quality, method=6)
         if path.stat().st_size <= LARGEST:

@@ -26,7 +26,7 @@ from panoscene.models.shape import (
     build_shape,
     extract_meshes,
     load_shape_stage,
-    thin_boxes,
+    slab_objects,
 )
 from panoscene.models.shape._fewer import FACES_PER_CELL, fewer_faces
 from panoscene.pipeline import Pipeline, load_stages
@@ -76,7 +76,7 @@ def _codes(network: ShapeNetwork, *, trained: bool) -> torch.Tensor:
         image, _ = read_panorama(sample_photo_path())
         stages = load_stages()
         found = Pipeline(replace(stages, shape=None), settings=None)(image).scene.objects
-        thick = (~thin_boxes(found.boxes.size)).nonzero()[:, 0]
+        thick = (~slab_objects(found)).nonzero()[:, 0]
         objects = select_objects(found, thick[torch.arange(OBJECTS) % len(thick)])
         return load_shape_stage().codes(image, objects)
     config = network.config

@@ -43,10 +43,11 @@ def main() -> None:
     for kind, found in scores.items():
         print(kind, found["objects"], "objects")
         for method in METHODS:
-            print(f"  {method:10}", {k: round(v, 3) for k, v in found["mean"][method].items()})
+            mean = found["mean"][method]
+            print(f"  {method:10}", {k: v and round(v, 3) for k, v in mean.items()})
     facts = {"machine": machine_facts(), "metrics": header.metrics, "scores": scores}
     facts |= {"models": len(task.seen), "pictures": task.sample_count()}
-    text = json.dumps(facts, indent=2) + "\n"
+    text = json.dumps(facts, indent=2, allow_nan=False) + "\n"
     write_atomically(Path(__file__).with_suffix(".json"), text)
 
 

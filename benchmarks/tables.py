@@ -7,6 +7,10 @@
     panoscene bench synth --json > benchmarks/synth.json
     panoscene bench stages --json > benchmarks/stages.json
     panoscene bench pipeline --json > benchmarks/pipeline.json
+    python benchmarks/layout.py DATA
+    python benchmarks/layout.py DATA --split train --output benchmarks/layout-train.json
+    python benchmarks/pose.py DATA --records FOLDER
+    python benchmarks/pose.py DATA --split train --output benchmarks/pose-train.json
     python benchmarks/upright.py FOLDER-OF-A-RENDERED-SET
     python benchmarks/curves.py NAME=RUN_FOLDER ...
     python benchmarks/shape_scores.py RECIPE WEIGHTS
@@ -38,8 +42,11 @@ PAGES = (
     "docs/arrange.md",
     "docs/detector.md",
     "docs/eval.md",
+    "docs/layout.md",
+    "docs/pose.md",
     "docs/reconstruct.md",
     "docs/scene.md",
+    "docs/shape.md",
     "docs/synth.md",
     "docs/train.md",
     "docs/upright.md",
@@ -50,6 +57,17 @@ SHAPE_KINDS = {
     "crops": "objects in validation panoramas",
     "unseen": "pictures of unseen models",
     "seen": "pictures of training models",
+}
+POSE_ROWS = {
+    "true_room": "true layout",
+    "no_crops": "true layout, no crops",
+    "no_room": "no layout",
+    "floor": "baseline",
+}
+POSE_FOUND = {
+    "found": "network",
+    "found_no_crops": "network, no crops",
+    "found_floor": "baseline on the same detections",
 }
 
 
@@ -77,6 +95,8 @@ def tables() -> dict[str, str]:
         **upright_text(),
         **curves_text(),
         **detector_text(),
+        **layout_text(),
+        **pose_text(),
         **shape_text(),
         **synth_text(),
         **seconds_text("stages"),
@@ -134,6 +154,72 @@ def detector_text() -> dict[str, str]:
         part = measured["split"]
         lines.append(f"| {part} | {measured['panoramas']} | {' | '.join(cells)} |")
     return {"detector-parts": "\n".join(lines)}
+
+
+def layout_text() -> dict[str, str]:
+    """Return the layout's scores on each part of the set, and how much truth its reading keeps."""
+    train, val = (_measured(f"layout{part}") for part in ("-train", ""))
+    test = json.loads((ROOT / "results" / "pose.json").read_text())
+    lines = [
+        "| part | rooms | 2D IoU | 3D IoU | 2D IoU as drawn | 3D IoU as drawn |",
+        "| --- " * 6 + "|",
+    ]
+    for found in (train, val):
+        row = found["rows"]["network"]
+        lines.append(_layout_row(found["part"], found["panoramas"], [
+            row[f"{drawn}iou_{k}d"] for drawn in ("", "raw_") for k in (2, 3)
+        ]))  # fmt: skip
+    names = [f"layout.{how}.overall.iou_{k}d" for how in ("regularised", "raw") for k in (2, 3)]
+    values = [test["metrics"][name]["value"] for name in names]
+    lines.append(_layout_row("test-seen and test-unseen", test["scenes"], values))
+    texts = {"layout-parts": "\n".join(lines)}
+    true = val["rows"]["true boundaries"]
+    texts["layout-truth"] = (
+        f"True boundaries read back give a 3D IoU of {true['iou_3d_4']:.3f} for rooms of four "
+        f"corners and {true['iou_3d']:.3f} for all {val['panoramas']} of {val['part']}."
+    )
+    row = val["rows"]["network"]
+    if "worse" in row:
+        rooms = val["panoramas"]
+        texts["layout-worse"] = (
+            f"On {val['part']} it is worse in {round(row['worse'] * rooms)} of {rooms} rooms, by "
+            f"at most {row['most_worse']:.3f}; {round(row['ambiguous'] * rooms)} of them are "
+            "`ambiguous`."
+        )
+    return texts
+
+
+def _layout_row(part: str, rooms: int, values: list[float]) -> str:
+    return f"| {part} | {rooms} | {' | '.join(f'{value:.3f}' for value in values)} |"
+
+
+def pose_text() -> dict[str, str]:
+    """Return the pose network's scores on each part of the set, and on what the networks find."""
+    parts = [_measured(f"pose{part}") for part in ("-train", "", "-test")]
+    head = "| part | objects | input | tied AP@0.15 | AP@0.15 | AP@0.25 | AP@0.5 | front for back |"
+    lines = [head, "| --- " * 8 + "|"]
+    for found in parts:
+        for name, words in POSE_ROWS.items():
+            row = found["rows"][name]
+            turned = f"{row['front_back']:.1%}".replace("%", " %")
+            lines.append(
+                f"| {found['split']} | {found['objects']} | {words} | {row['ap_15']:.3f} |"
+                f" {_ranked(row)} | {turned} |"
+            )
+    rows = parts[1]["rows"]
+    found = ["| input | AP@0.15 | AP@0.25 | AP@0.5 |", "| --- " * 4 + "|"]
+    found += [
+        f"| {words} | {_ranked(rows[name])} |" for name, words in POSE_FOUND.items() if name in rows
+    ]
+    return {"pose-parts": "\n".join(lines), "pose-found": "\n".join(found)}
+
+
+def _ranked(row: dict[str, float]) -> str:
+    return " | ".join(f"{row[f'ranked_ap_{percent}']:.3f}" for percent in (15, 25, 50))
+
+
+def _measured(name: str) -> dict[str, Any]:
+    return json.loads((ROOT / "benchmarks" / f"{name}.json").read_text())
 
 
 def curves_text() -> dict[str, str]:
@@ -208,7 +294,8 @@ def shape_text() -> dict[str, str]:
 def _shape_cell(methods: dict[str, Any] | None) -> str:
     if methods is None:
         return ""
-    overlaps = " / ".join(f"{found['volume_iou']:.2f}" for found in methods.values())
+    values = [found["volume_iou"] for found in methods.values()]
+    overlaps = " / ".join("-" if value is None else f"{value:.2f}" for value in values)
     return f"{overlaps} ({methods['network']['objects']})"
 
 
