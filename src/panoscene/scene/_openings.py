@@ -48,7 +48,7 @@ def wall_openings(scene: Scene) -> list[Float[Tensor, "openings 4"]]:
     layout, boxes = scene.layout, scene.objects.boxes
     corners = layout.floor_polygon
     edge = corners.roll(-1, 0) - corners
-    length = edge.norm(dim=-1)
+    length = edge.square().sum(-1).sqrt()
     along = edge / length.clamp(min=1e-9)[:, None]
     normal = wall_normals(corners)
     foot = box_footprint(boxes)[:, None] - corners[:, None]
@@ -65,7 +65,7 @@ def wall_openings(scene: Scene) -> list[Float[Tensor, "openings 4"]]:
     half = boxes.size[:, 2] / 2
     low = (boxes.centre[:, 2] - half).clamp(min=layout.floor_height + _RIM)
     high = (boxes.centre[:, 2] + half).clamp(max=layout.ceiling_height - _RIM)
-    found = []
+    found: list[Tensor] = []
     for k in range(len(corners)):
         mine = kept & (wall[:, 0] == k)
         first = place[mine, k].amin(-1).clamp(min=_RIM)
@@ -91,9 +91,9 @@ def opened_wall(
         high: z of the ceiling.
         openings: as ``wall_openings`` says.
     """
-    length = float((end - start).norm())
-    x = torch.cat([openings[:, :2].flatten(), openings.new_tensor([0.0, length])]).unique()
-    z = torch.cat([openings[:, 2:].flatten(), openings.new_tensor([low, high])]).unique()
+    length = float((end - start).square().sum().sqrt())
+    x = _ticks(openings[:, :2], 0.0, length)
+    z = _ticks(openings[:, 2:], low, high)
     whole = _closed(x, z, openings)
     ground = start + (end - start) * (x / max(length, 1e-9))[:, None]
     vertices = torch.cat([ground.repeat(len(z), 1), z.repeat_interleave(len(x))[:, None]], dim=1)
@@ -103,6 +103,14 @@ def opened_wall(
     lower = torch.stack([corner, above + 1, right], -1)
     upper = torch.stack([corner, above, above + 1], -1)
     return vertices, torch.cat([lower, upper])
+
+
+def _ticks(
+    sides: Float[Tensor, "openings 2"], first: float, last: float
+) -> Float[Tensor, " ticks"]:
+    """Return where the sides of openings and the ends are, in order, each once."""
+    ticks = torch.cat([sides.flatten(), sides.new_tensor([first, last])]).sort().values
+    return ticks[torch.cat([ticks.new_ones(1, dtype=torch.bool), ticks[1:] > ticks[:-1]])]
 
 
 def _closed(

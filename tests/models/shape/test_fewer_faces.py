@@ -5,6 +5,7 @@ import pytest
 import torch
 import trimesh
 
+from panoscene.models.shape import _fewer
 from panoscene.models.shape._fewer import _gathered, _parted, _unfolded, fewer_faces, is_closed
 from panoscene.scene import Mesh, box_mesh
 
@@ -29,6 +30,17 @@ def test_a_ball_keeps_its_shape_and_its_bounds() -> None:
 def test_meshes_with_few_triangles_stay_as_they_are() -> None:
     mesh = box_mesh()
     assert fewer_faces(mesh, 12) is mesh
+
+
+def test_gathering_alone_may_be_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.5)
+    mesh = Mesh(torch.tensor(ball.vertices).float(), torch.tensor(ball.faces))
+    few = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
+    gathered = few.vertices, few.faces.astype(np.int64)
+    monkeypatch.setattr(_fewer, "_gathered", lambda *_: gathered)
+    found = fewer_faces(mesh, 400)
+    assert len(found.faces) == len(few.faces) < 400
+    assert as_trimesh(found).is_watertight
 
 
 def test_what_is_not_closed_stays_as_it_is() -> None:

@@ -264,7 +264,7 @@ def _thinned(
         fewer = rooms_of(places, axes, evidence)
         tried = fewer.chosen(np.argsort(fewer.cost)[: 1 if many else TRIED])
         tried = _settled(tried, axes, evidence, rounds=1 if many else 3)
-        room = tried.chosen(tried.cost.argmin(keepdims=True))
+        room = tried.chosen(np.array([tried.cost.argmin()]))
 
 
 def _fit(room: Rooms, axes: Float[np.ndarray, "2 2"], noise: float = 1.0) -> Fit:

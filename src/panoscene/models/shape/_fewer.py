@@ -44,12 +44,13 @@ def fewer_faces(mesh: Mesh, most: int) -> Mesh:
     before = mesh.vertices.double().numpy(force=True)
     faces = mesh.faces.long().numpy(force=True)
     some, few = _gathered(before, faces, most)
-    with _ONE_AT_A_TIME:
-        found = fast_simplification.simplify(
-            some, few.astype(np.int32), target_count=most, agg=_BOLDNESS
-        )
-    points, left = _fitted(np.asarray(found[0], np.float64), before), _unfolded(found[1])
-    points, left = _parted(points, left)
+    if len(few) > most:
+        with _ONE_AT_A_TIME:
+            some, few = fast_simplification.simplify(
+                some, few.astype(np.int32), target_count=most, agg=_BOLDNESS
+            )
+    points = _fitted(np.asarray(some, np.float64), before)
+    points, left = _parted(points, _unfolded(few))
     if len(left) == 0 or not is_closed(left):
         return mesh
     return Mesh(torch.from_numpy(points).to(mesh.vertices), torch.from_numpy(left).to(mesh.faces))
