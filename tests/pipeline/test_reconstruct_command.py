@@ -157,6 +157,17 @@ def test_outputs_that_cannot_be_are_refused(run: Run, photo: Path, tmp_path: Pat
     assert not (tmp_path / "rooms").exists()
 
 
+@pytest.mark.usefixtures("loaded")
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder that nobody can write into")
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(
+    run: Run, photo: Path, knowing: Knowing
+) -> None:
+    code, _, err = run(photo, "-o", "/proc/nothing/room")
+    assert code == 2
+    assert "--output /proc/nothing/room: cannot be written" in err
+    assert knowing.asked == []
+
+
 def test_missing_and_damaged_weights_are_refused(run: Run, photo: Path, tmp_path: Path) -> None:
     weights = tmp_path / "weights"
     weights.mkdir()

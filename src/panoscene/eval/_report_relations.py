@@ -80,9 +80,9 @@ def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str
             ours, theirs = (row.metrics.get(column.metric) for row in (rows[name], rule))
             if not column.heading.endswith("F1") or ours is None or theirs is None:
                 continue
-            if ours.value is not None and theirs.value is not None:
-                better = ours.value > theirs.value
-                (ahead if better else behind).append((column, ours, theirs))
+            if ours.value is None or theirs.value is None or ours.value == theirs.value:
+                continue
+            (ahead if ours.value > theirs.value else behind).append((column, ours, theirs))
         words = f"`{name}` is ahead in {listed([_relation(column) for column, _, _ in ahead])}"
         if behind:
             cells = [
@@ -94,23 +94,8 @@ def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str
         verdicts.append(words)
     if not verdicts:
         return ""
-    truth = [
-        f"{measured.value:.0f} of {_relation(column)}"
-        for column in columns
-        if column.heading.endswith("F1")
-        and (measured := rule.metrics.get(_count_of(column))) is not None
-        and measured.value is not None
-    ]
-    counted = f" True ones between the matched objects of `{_RULE}`: {listed(truth)}."
-    return (
-        f"F1 against the rule of geometry on the boxes of `{_RULE}`: {'; '.join(verdicts)}."
-        f"{counted if truth and columns is MATCHED_RELATIONS else ''}"
-    )
+    return f"F1 against the rule of geometry on the boxes of `{_RULE}`: {'; '.join(verdicts)}."
 
 
 def _relation(column: Column) -> str:
     return column.heading.removesuffix(" F1")
-
-
-def _count_of(column: Column) -> str:
-    return f"{column.metric.removesuffix('_f1')}_in_target"
