@@ -92,7 +92,7 @@ def render(
         panoscene synth render configs/synth/full.yaml data --limit 400
         panoscene synth render configs/synth/full.yaml /shared/data --ray
 
-    The first one takes minutes and shows whether everything works. OUT/README.md describes what
+    The first one takes about a minute and shows whether everything works. OUT/README.md describes what
     is there, OUT/ATTRIBUTION names the makers of the models.
 
     Args:

@@ -46,9 +46,10 @@ def fewer_faces(mesh: Mesh, most: int) -> Mesh:
     some, few = _gathered(before, faces, most)
     if len(few) > most:
         with _ONE_AT_A_TIME:
-            some, few = fast_simplification.simplify(
+            simplified = fast_simplification.simplify(
                 some, few.astype(np.int32), target_count=most, agg=_BOLDNESS
             )
+        some, few = simplified[0], simplified[1]
     points = _fitted(np.asarray(some, np.float64), before)
     points, left = _parted(points, _unfolded(few))
     if len(left) == 0 or not is_closed(left):
