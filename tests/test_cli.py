@@ -392,7 +392,7 @@ def test_bad_scenes_are_refused(folder: Path, run: Run, command: str, kind: str)
         (("arrange", "room.json", "-o", "boxes.csv"), "boxes.csv: found a file"),
         (
             ("arrange", "room.json", "-o", "boxes.csv/x"),
-            "cannot be written: boxes.csv/x: not a directory",
+            "--output boxes.csv/x: cannot be written: not a directory",
         ),
         (("arrange", "room.json", "-o", "o", "--steps", "-1"), "--steps: found -1"),
         (("arrange", "room.json", "-o", "o", "--settings", "no.json"), "no.json: no such file"),

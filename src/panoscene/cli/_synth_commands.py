@@ -92,8 +92,8 @@ def render(
         panoscene synth render configs/synth/full.yaml data --limit 400
         panoscene synth render configs/synth/full.yaml /shared/data --ray
 
-    The first one takes about a minute and shows whether everything works. OUT/README.md describes what
-    is there, OUT/ATTRIBUTION names the makers of the models.
+    The first one takes about a minute and shows whether everything works. OUT/README.md describes
+    what is there, OUT/ATTRIBUTION names the makers of the models.
 
     Args:
         recipe: A .yaml file, such as those in configs/synth.
