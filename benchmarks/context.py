@@ -178,7 +178,7 @@ def _third_step(before: Mapping, after: Mapping, training: Mapping) -> list[str]
         f" {training['gradient_context']:.1f} long in this network and"
         f" {training['gradient_pose']:.1f} in the",
         f"pose network. Published are the weights {'before' if not training['kept'] else 'after'}"
-        " it.", "",
+        " it; \"before\" has them, which may have been trained on since.", "",
         "| | AP@0.15 | AP@0.25 | AP@0.5 | touching | touching a wall | on the floor |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]  # fmt: skip

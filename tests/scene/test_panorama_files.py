@@ -62,6 +62,17 @@ def test_a_picture_with_more_columns_than_enough_is_reduced(tmp_path: Path, mode
         read_panorama(path, columns=0)
 
 
+@pytest.mark.parametrize("mode", ["RGB", "L"])
+def test_a_large_jpeg_is_decoded_smaller(tmp_path: Path, mode: str) -> None:
+    Image.fromarray(gradient()).convert(mode).save(tmp_path / "pano.jpg", quality=95)
+    image, panorama = read_panorama(tmp_path / "pano.jpg", columns=WIDTH // 2)
+    assert (panorama.width, panorama.height) == (WIDTH, HEIGHT)
+    whole = read_panorama(tmp_path / "pano.jpg")[0]
+    mean = torch.nn.functional.avg_pool2d(whole[None], 2)[0]
+    assert image.shape == mean.shape
+    assert (image - mean).abs().mean() < 0.02
+
+
 def test_greyscale(tmp_path: Path) -> None:
     Image.fromarray(gradient()[..., 0]).save(tmp_path / "pano.png")
     image, _ = read_panorama(tmp_path / "pano.png")

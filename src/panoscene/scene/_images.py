@@ -69,7 +69,7 @@ def read_panorama(
             with Image.open(path, formats=FORMATS) as picture:
                 width, height = _upright_size(picture)
                 _check_size((width, height), file)
-                image = _rgb(picture, file, 1 if columns is None else max(width // columns, 1))
+                image = _rgb(picture, file, _reduction(picture, columns))
         except PanoramaError:
             raise
         except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
@@ -91,6 +91,18 @@ def _upright_size(picture: Image.Image) -> tuple[int, int]:
     width, height = picture.size
     turned = picture.getexif().get(_EXIF_ORIENTATION) in (5, 6, 7, 8)
     return (height, width) if turned else (width, height)
+
+
+def _reduction(picture: Image.Image, columns: int | None) -> int:
+    """Return how many pixels along each axis become one, after what a JPEG can leave out."""
+    if columns is None:
+        return 1
+    factor = max(_upright_size(picture)[0] // columns, 1)
+    if factor > 1:
+        width, height = picture.size
+        # decodes a half, a quarter or an eighth of the pixels along each axis; JPEG only
+        picture.draft(None, (width // factor, height // factor))
+    return max(_upright_size(picture)[0] // columns, 1)
 
 
 def _check_size(size: tuple[int, int], file: str) -> None:
