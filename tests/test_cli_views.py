@@ -444,7 +444,7 @@ def test_arrange_writes_reports_and_animations(
 
 @pytest.mark.render
 def test_arrange_animates(folder: Path, run: Run) -> None:
-    write_room("small.json", objects=ROOM["objects"][1:])
+    write_room("small.json", objects=ROOM["objects"][1:])  # ty: ignore[invalid-argument-type]
     assert run("arrange", "small.json", "-o", "o.json", "--animation", "--steps", "1")[0] == 0
     with Image.open("o.repair.webp") as film:
         assert getattr(film, "n_frames", 0) >= 1

@@ -12,7 +12,7 @@ import pytest
 CHECKS = {
     "ruff check": ["ruff", "check", "."],
     "ruff format": ["ruff", "format", "--check", "."],
-    "pyright": ["pyright", "--pythonpath", sys.executable],
+    "types": ["ty", "check", "--python", sys.executable, "--error-on-warning"],
     "import direction": ["lint-imports"],
     "dependencies": ["deptry", "src"],
     "pre-commit configuration": ["pre-commit", "validate-config"],
@@ -28,13 +28,7 @@ def run_tool(command: list[str], folder: Path) -> None:
     assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
 
 
-@pytest.mark.parametrize(
-    "check",
-    [
-        pytest.param(check, marks=[pytest.mark.slow] if check == "pyright" else [])
-        for check in CHECKS
-    ],
-)
+@pytest.mark.parametrize("check", CHECKS)
 def test_check_passes(check: str, root: Path) -> None:
     run_tool(CHECKS[check], root)
 

@@ -111,4 +111,4 @@ def test_semantic_means() -> None:
 
 def test_the_tables_cannot_be_changed() -> None:
     with pytest.raises(TypeError):
-        PAPER_MAP_57["Ours Full"] = 99.0  # pyright: ignore[reportIndexIssue]
+        PAPER_MAP_57["Ours Full"] = 99.0  # ty: ignore[invalid-assignment]

@@ -44,7 +44,7 @@ def scene_of(*objects: tuple[str, tuple[float, ...], tuple[float, ...], float]) 
 
 
 def seen(scene: Scene, directions: torch.Tensor = AHEAD, method: str = "boxes") -> list[str]:
-    labels = semantic_labels(scene, directions, method)  # pyright: ignore[reportArgumentType]
+    labels = semantic_labels(scene, directions, method)  # ty: ignore[invalid-argument-type]
     return [PANOCONTEXT_12[k] for k in labels.tolist()]
 
 
@@ -65,7 +65,7 @@ def test_a_box_ahead_covers_its_solid_angle(method: str) -> None:
     """A rectangle of half sides a, b at h covers 4 asin(a b / sqrt((a^2 + h^2) (b^2 + h^2)))."""
     a, b, h = 0.8, 0.5, 1.5
     scene = scene_of(("bed", (0.0, h + 0.3, 1.6), (2 * a, 0.6, 2 * b), 0.0))
-    labels = semantic_labels(scene, sphere_directions(100_000), method)  # pyright: ignore
+    labels = semantic_labels(scene, sphere_directions(100_000), method)  # ty: ignore[invalid-argument-type]
     share = (labels == PANOCONTEXT_12.index("bed")).float().mean()
     wanted = 4 * math.asin(a * b / math.sqrt((a * a + h * h) * (b * b + h * h))) / (4 * math.pi)
     assert float(share) == pytest.approx(wanted, rel=2e-3)
@@ -152,7 +152,7 @@ def test_a_box_around_the_camera_is_not_drawn(method: str) -> None:
     bed = ("bed", (0.0, 3.0, 1.6), (1.0, 1.0, 1.0), 0.0)
     scene = scene_of(around, bed)
     assert seen(scene, method=method) == ["bed"]
-    record = semantic_record(scene, scene_of(bed), POINTS, method)  # pyright: ignore
+    record = semantic_record(scene, scene_of(bed), POINTS, method)  # ty: ignore[invalid-argument-type]
     assert record.boxes_around_camera == 1
     assert score_semantic([record, record]).mean_iou == 1
 
@@ -173,7 +173,7 @@ def test_meshes_show_their_own_shape() -> None:
 @pytest.mark.parametrize("method", ["boxes", "surfaces"])
 def test_an_empty_room_is_background(method: str) -> None:
     assert set(seen(scene_of(), POINTS, method)) == {"background"}
-    score = score_semantic([semantic_record(scene_of(), scene_of(), POINTS, method)])  # pyright: ignore
+    score = score_semantic([semantic_record(scene_of(), scene_of(), POINTS, method)])  # ty: ignore[invalid-argument-type]
     assert score.mean_iou == 1
     assert score.mean_iou_objects is None
     assert len(score.absent) == 11
@@ -228,7 +228,7 @@ def test_bad_labels_are_refused(bad: torch.Tensor) -> None:
 
 def test_an_unknown_method_is_refused() -> None:
     with pytest.raises((ValueError, TypeError), match=r"method|type"):
-        semantic_labels(scene_of(), AHEAD, "outlines")  # pyright: ignore
+        semantic_labels(scene_of(), AHEAD, "outlines")  # ty: ignore[invalid-argument-type]
 
 
 def test_records_add_up(generator: torch.Generator) -> None:

@@ -1,5 +1,6 @@
 import math
 from functools import partial
+from typing import Any
 
 import py360convert
 import pytest
@@ -208,7 +209,7 @@ def test_faces_look_where_they_say_and_meet_as_documented() -> None:
         expected = scene(torch.tensor([[axis]], dtype=torch.float64))[:, 0, 0]
         torch.testing.assert_close(towards[name][:, 16, 16], expected, atol=1e-3, rtol=0)
     top, bottom, left, right = (..., 0, slice(None)), (..., -1, slice(None)), (..., 0), (..., -1)
-    meetings = [("front", right, "right", left), ("right", right, "back", left)]
+    meetings: list[Any] = [("front", right, "right", left), ("right", right, "back", left)]
     meetings += [("back", right, "left", left), ("left", right, "front", left)]
     meetings += [("up", bottom, "front", top), ("front", bottom, "down", top)]
     for one, edge, other, other_edge in meetings:

@@ -171,7 +171,7 @@ def test_imagenet_weights_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     torch.save(network.state_dict(), tmp_path / "resnet18.pth")
     monkeypatch.setenv("PANOSCENE_IMAGENET", str(tmp_path))
     backbone = build_backbone("resnet18", imagenet=True)
-    assert torch.equal(backbone.network.conv1.weight, network.conv1.weight)  # pyright: ignore
+    assert torch.equal(backbone.network.conv1.weight, network.conv1.weight)  # ty: ignore[invalid-argument-type, missing-union-attribute]
     with pytest.raises(CheckpointError, match=r"found .*expected .*resnet34"):
         build_backbone("resnet34", imagenet=tmp_path / "resnet18.pth")
 

@@ -51,20 +51,20 @@ def test_round_trip(tmp_path: Path) -> None:
 
 def test_halves_keep_vectors_exact(tmp_path: Path) -> None:
     one, other = network(), network()
-    one[1].running_var.fill_(1e-9)  # pyright: ignore
+    one[1].running_var.fill_(1e-9)  # ty: ignore[not-subscriptable]
     write_weights(tmp_path / "w.safetensors", one, HEADER)
     stored = load_file(tmp_path / "w.safetensors")
     assert stored["0.weight"].dtype == torch.float16
     read_weights(tmp_path / "w.safetensors", other, stage="layout", edition="compact")
-    assert torch.equal(other[0].bias, one[0].bias)  # pyright: ignore
-    assert torch.equal(other[1].running_var, one[1].running_var)  # pyright: ignore
-    torch.testing.assert_close(other[0].weight, one[0].weight, atol=1e-3, rtol=1e-3)  # pyright: ignore
+    assert torch.equal(other[0].bias, one[0].bias)  # ty: ignore[not-subscriptable]
+    assert torch.equal(other[1].running_var, one[1].running_var)  # ty: ignore[not-subscriptable]
+    torch.testing.assert_close(other[0].weight, one[0].weight, atol=1e-3, rtol=1e-3)  # ty: ignore[not-subscriptable]
 
 
 def test_too_large_for_a_half(tmp_path: Path) -> None:
     module = network()
     with torch.no_grad():
-        module[0].weight[0, 0, 0, 0] = 1e6  # pyright: ignore
+        module[0].weight[0, 0, 0, 0] = 1e6  # ty: ignore[not-subscriptable]
     with pytest.raises(ValueError, match=r"0\.weight that are not finite"):
         write_weights(tmp_path / "w.safetensors", module, HEADER)
     assert list(tmp_path.iterdir()) == []
@@ -79,7 +79,7 @@ def test_another_stage_or_edition(tmp_path: Path, stage: str, edition: str, foun
     write_weights(file, network(), HEADER)
     message = f"{file}: found weights of the {found}, expected those of the {edition} {stage}"
     with pytest.raises(CheckpointError, match=message):
-        read_weights(file, network(), stage=stage, edition=edition)  # pyright: ignore
+        read_weights(file, network(), stage=stage, edition=edition)  # ty: ignore[invalid-argument-type]
 
 
 def test_another_shape_changes_nothing(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from panoscene.pipeline._load import AtFirstUse
 def test_the_package_loads_pipelines_and_is_light_to_import() -> None:
     assert panoscene.load is load
     with pytest.raises(AttributeError, match="no attribute 'unload'"):
-        _ = panoscene.unload  # pyright: ignore[reportAttributeAccessIssue]
+        _ = panoscene.unload  # ty: ignore[missing-attribute]
     code = "import panoscene, sys; print('torch' in sys.modules, 'numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]
@@ -49,7 +49,7 @@ def test_a_stage_is_made_at_its_first_use_and_once() -> None:
         made.append(1)
         return torch.add
 
-    stage = AtFirstUse(make)  # pyright: ignore[reportArgumentType]
+    stage = AtFirstUse(make)  # ty: ignore[invalid-argument-type]
     assert made == []
     assert [int(stage(torch.tensor(1), 2)), int(stage(torch.tensor(1), 3))] == [3, 4]
     assert made == [1]
@@ -65,7 +65,7 @@ def test_threads_that_need_a_stage_wait_for_each_other() -> None:
         made.append(1)
         return torch.add
 
-    stage = AtFirstUse(make)  # pyright: ignore[reportArgumentType]
+    stage = AtFirstUse(make)  # ty: ignore[invalid-argument-type]
     with ThreadPoolExecutor(2) as pool:
         first = pool.submit(stage.ready)
         assert begun.wait(10)
@@ -86,7 +86,7 @@ def test_steps_load_all_stages_in_the_order_of_their_use() -> None:
     assert [getattr(step, "__self__", None) for step in load_steps(lean)] == [
         lean.detector, lean.layout, lean.pose
     ]  # fmt: skip
-    assert load_steps(Stages(torch.add, torch.add, torch.add)) == []  # pyright: ignore[reportArgumentType]
+    assert load_steps(Stages(torch.add, torch.add, torch.add)) == []  # ty: ignore[invalid-argument-type]
 
 
 def test_weights_of_ones_own_are_checked_at_once(tmp_path: Path) -> None:

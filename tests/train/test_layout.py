@@ -121,7 +121,7 @@ def test_validation_reports_both_polygons_by_corners(task: LayoutTask) -> None:
 def test_pictures_show_truth_and_prediction() -> None:
     prediction, scene = truth_read_back(0)
     photo = torch.zeros(3, 128, 256, dtype=torch.uint8).numpy()
-    with_truth = layout_picture(photo, prediction, scene)  # pyright: ignore
+    with_truth = layout_picture(photo, prediction, scene)
     without = layout_picture(photo, prediction)
     assert with_truth.shape == without.shape == (512, 1536, 3)
     green = (with_truth == (27, 158, 119)).all(-1)

@@ -3,6 +3,7 @@
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,11 +104,12 @@ def with_objects(scene: Scene, boxes) -> Scene:
 def test_relations_and_reference_are_drawn_when_asked_for(tmp_path: Path) -> None:
     scene = room(5, 3)
     files = {}
-    for name, options in {
+    kinds: dict[str, dict[str, Any]] = {
         "plain": {"relations": False},
         "relations": {},
         "reference": {"relations": False, "reference": room(6, 2)},
-    }.items():
+    }
+    for name, options in kinds.items():
         files[name] = tmp_path / f"{name}.png"
         draw_birds_eye(scene, files[name], size_px=SMALL, **options)
     plain = pixels(files["plain"])

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -124,9 +125,9 @@ def open_report(browser: Browser, files: Path) -> Iterator[Opener]:
     complaints: list[str] = []
     contexts: list[BrowserContext] = []
 
-    def open_it(name: str, *, script: str = "", **options: object) -> Page:
+    def open_it(name: str, *, script: str = "", **options: Any) -> Page:
         options = {"reduced_motion": "reduce", "device_scale_factor": COARSE} | options
-        context = browser.new_context(**options)  # pyright: ignore[reportArgumentType]
+        context = browser.new_context(**options)
         contexts.append(context)
         if script:
             context.add_init_script(script)

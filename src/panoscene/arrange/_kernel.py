@@ -110,13 +110,13 @@ class Kernel:
             name: value.detach().numpy() if isinstance(value, Tensor) else value
             for name, value in values.items()
         }
-        library = {
+        library: dict[str, Any] = {
             "xp": np,
             "stack": np.array,
             "stack_last": _stack_last,
             "least": np.minimum.reduce,
         }
-        return Kernel(**{**arrays, **library})
+        return Kernel(**(arrays | library))
 
 
 def _stack_last(rows: list[Any]) -> Any:

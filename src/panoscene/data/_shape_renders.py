@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -99,12 +100,12 @@ def _turned(points: Float64[np.ndarray, "n 3"], yaw: float) -> Float64[np.ndarra
 
 
 def _cast(
-    caster: object, eye: Float64[np.ndarray, "3"], direction: Float64[np.ndarray, "n 3"]
+    caster: Any, eye: Float64[np.ndarray, "3"], direction: Float64[np.ndarray, "n 3"]
 ) -> tuple[Int64[np.ndarray, " n"], Float64[np.ndarray, "n 3"]]:
     """Return the first face that each ray hits, or -1, and where."""
     face = np.full(len(direction), -1, np.int64)
     place = np.zeros((len(direction), 3))
-    triangle, ray, location = caster.intersects_id(  # pyright: ignore
+    triangle, ray, location = caster.intersects_id(
         np.broadcast_to(eye, direction.shape),
         direction,
         multiple_hits=False,
@@ -116,19 +117,19 @@ def _cast(
 
 def _shaded(
     model: CadModel,
-    mesh: object,
+    mesh: Any,
     *,
     eye: Float64[np.ndarray, "3"],
     direction: Float64[np.ndarray, "n 3"],
     rng: np.random.Generator,
 ) -> tuple[UInt8[np.ndarray, "n 3"], UInt8[np.ndarray, " n"]]:
     """Return the colour of each ray under a lamp and light from all sides, and what is hit."""
-    face, place = _cast(mesh.ray, eye, direction)  # pyright: ignore
+    face, place = _cast(mesh.ray, eye, direction)
     hit = np.flatnonzero(face >= 0)
     colour = np.zeros((len(direction), 3))
     if len(hit):
         triangle = face[hit]
-        normal = np.asarray(mesh.face_normals)[triangle]  # pyright: ignore
+        normal = np.asarray(mesh.face_normals)[triangle]
         normal = np.where((normal * direction[hit]).sum(1, keepdims=True) > 0, -normal, normal)
         lamp = rng.normal(size=3) * (1.0, 1.0, 0.4) + (0.0, 0.0, 1.2)
         lamp /= np.linalg.norm(lamp)

@@ -73,7 +73,7 @@ def write_stage_record(record: StageRecord, path: Path) -> None:
     detections = [
         _Detection(
             category=CATEGORIES[int(found.category[k])],
-            bfov=_row(found.bfov[k]),  # pyright: ignore[reportArgumentType]
+            bfov=_row(found.bfov[k]),
             score=round(float(found.score[k].clamp(0.0, 1.0)), _DIGITS),
             mask=None if mask is None else _mask(mask),
         )
@@ -156,12 +156,12 @@ def _layout_format(record: StageRecord) -> _Layout | None:
     if layout is None:
         return None
     return _Layout(
-        floor_polygon=[_row(point) for point in layout.floor_polygon],  # pyright: ignore
+        floor_polygon=[_row(point) for point in layout.floor_polygon],
         ceiling_height=round(layout.ceiling_height, _DIGITS),
         wall_score=None if layout.wall_score is None else list(_row(layout.wall_score)),
         raw_polygon=None
         if layout.raw_polygon is None
-        else [_row(point) for point in layout.raw_polygon],  # pyright: ignore
+        else [_row(point) for point in layout.raw_polygon],
         ambiguous=record.ambiguous,
     )
 

@@ -64,9 +64,9 @@ def split_by_fov(seen: Seen, fov_deg: int) -> list[Seen]:
     """
     if isinstance(seen, Detections):
         sector = fov_sector(seen.bfov[:, 0], fov_deg)
-        return [_part_of_detections(seen, chosen) for chosen in _members(sector, fov_deg)]
+        return [_part_of_detections(seen, chosen) for chosen in _members(sector, fov_deg)]  # ty: ignore[invalid-explicit-return]
     sector = fov_sector(seen.objects.bfov[:, 0], fov_deg)
-    return [select(seen, chosen) for chosen in _members(sector, fov_deg)]
+    return [select(seen, chosen) for chosen in _members(sector, fov_deg)]  # ty: ignore[invalid-explicit-return]
 
 
 def run_by_fov(predictor: Callable[[Scene], Scene], scene: Scene, fov_deg: int) -> Scene:

@@ -6,6 +6,7 @@ neighbours of a sample are found in tables as long as the image's sides, so a cr
 panorama reads only the pixels it needs.
 """
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -53,7 +54,7 @@ def interpolate(
     images = image.shape[:-3]
     # all images side by side: one gradient buffer, and no copy of an image that many crops share
     values = image.movedim(-3, 0).flatten(1)
-    first = (torch.arange(images.numel(), device=image.device) * (height * width)).view(images)
+    first = (torch.arange(math.prod(images), device=image.device) * (height * width)).view(images)
     corner = (uv.detach() - (0.0 if mode == "nearest" else 0.5)).floor()
     column, row = corner.long().unbind(-1)
     # counted from the first entry of the tables for the tap before the corner

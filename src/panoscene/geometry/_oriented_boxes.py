@@ -23,7 +23,7 @@ class OrientedBoxes:
 
     def __getitem__(self, index: object) -> "OrientedBoxes":
         """Return the boxes selected by ``index`` along the batch axes."""
-        return OrientedBoxes(self.centre[index], self.size[index], self.yaw[index])  # pyright: ignore
+        return OrientedBoxes(self.centre[index], self.size[index], self.yaw[index])  # ty: ignore[invalid-argument-type]
 
     def __len__(self) -> int:
         """Return the length of the first batch axis."""

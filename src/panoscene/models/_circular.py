@@ -122,7 +122,7 @@ def _convert_convolution(layer: nn.Conv2d) -> None:
     if max(layer.kernel_size) == 1 or not (same or _numbers(layer)[1]):
         return
     layer.__class__ = CircularConv2d
-    layer.same = same  # pyright: ignore
+    layer.same = same  # ty: ignore[invalid-assignment]
 
 
 def _numbers(layer: nn.Conv2d) -> tuple[int, int]:
@@ -133,8 +133,8 @@ def _numbers(layer: nn.Conv2d) -> tuple[int, int]:
             d * (k - 1) // 2 for d, k in zip(layer.dilation, layer.kernel_size, strict=True)
         )
         return rows, columns
-    return _pair(layer.padding)
+    return _pair(layer.padding)  # ty: ignore[invalid-argument-type]
 
 
-def _pair(amount: object) -> tuple[int, int]:
-    return (amount[0], amount[1]) if isinstance(amount, tuple) else (int(amount), int(amount))  # pyright: ignore
+def _pair(amount: int | tuple[int, ...]) -> tuple[int, int]:
+    return (amount[0], amount[1]) if isinstance(amount, tuple) else (amount, amount)

@@ -57,7 +57,7 @@ def formatted(value: Any, indent: str = "") -> str:
         return _ENCODER.encode(value)
     deeper = indent + "  "
     is_object = isinstance(value, dict)
-    children: list[Any] = list(value.values() if is_object else value)  # pyright: ignore
+    children: list[Any] = list(value.values() if is_object else value)
     if not any(isinstance(child, dict | list) for child in children):
         return _ENCODER.encode(value)
     if not is_object and all(type(child) is list for child in children):
@@ -70,7 +70,7 @@ def formatted(value: Any, indent: str = "") -> str:
             return f"[\n{deeper}{rows}\n{indent}]"
     parts = [formatted(child, deeper) for child in children]
     if is_object:
-        keys = [_ENCODER.encode(key) for key in value]  # pyright: ignore
+        keys = [_ENCODER.encode(key) for key in value]
         parts = [f"{key}: {part}" for key, part in zip(keys, parts, strict=True)]
     opening, closing = "{}" if is_object else "[]"
     length = len(indent) + sum(len(part) + 2 for part in parts)

@@ -61,7 +61,7 @@ def write_graphml(scene: Scene, path: str | os.PathLike[str], *, threshold: floa
         if "angle" in edge:
             attributes |= {"angle": edge["angle"], "angle_deg": math.degrees(edge["angle"])}
         graph.add_edge(source, target, **attributes)
-    lines: list[str] = list(networkx.generate_graphml(graph))  # pyright: ignore[reportUnknownMemberType]
+    lines: list[str] = list(networkx.generate_graphml(graph))
     write_atomically(Path(path), "\n".join(lines) + "\n")
 
 

@@ -113,14 +113,14 @@ def _coco_precision(
             return overlaps[imgId][[note["id"] - 1 for note in answers]][:, targets]
 
     with contextlib.redirect_stdout(io.StringIO()):
-        evaluation = Evaluation(iouType="segm")  # pyright: ignore[reportCallIssue]
+        evaluation = Evaluation(iouType="segm")
         evaluation.params.imgIds = list(range(len(truth)))
         evaluation.params.catIds = list(range(len(CATEGORIES)))
-        evaluation.params.areaRng, evaluation.params.areaRngLbl = [[0, 1e10]], ["all"]
+        evaluation.params.areaRng, evaluation.params.areaRngLbl = [[0, 1e10]], ["all"]  # ty: ignore[invalid-assignment]
         evaluation.params.maxDets = [100]
         evaluation.evaluate()
         evaluation.accumulate()
-    return np.maximum(evaluation.eval["precision"][:, :, :, 0, 0], 0.0)
+    return np.maximum(evaluation.eval["precision"][:, :, :, 0, 0], 0.0)  # ty: ignore[invalid-argument-type, not-subscriptable]
 
 
 def overlap_table(found: Detections, seen: SeenObjects, kind: str) -> Float[Tensor, "found seen"]:

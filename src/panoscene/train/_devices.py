@@ -64,7 +64,7 @@ def start_fabric(recipe: TrainRecipe, run: Path) -> "Fabric":
         num_nodes=recipe.num_nodes,
         # a part of the network may have no loss in a batch, such as masks without objects
         strategy=DDPStrategy(find_unused_parameters=True) if several else "auto",
-        precision=chosen_precision(recipe.precision),  # pyright: ignore[reportArgumentType]
+        precision=chosen_precision(recipe.precision),  # ty: ignore[invalid-argument-type]
     )
     fabric.launch()
     if recipe.threads is not None:

@@ -1,6 +1,7 @@
 """Pictures of predicted rooms: boundaries on the panorama, floor plans beside it."""
 
 import math
+from typing import Any
 
 import numpy as np
 import torch
@@ -61,13 +62,13 @@ def layout_boundary(layout: Layout, camera_height: float) -> Float[Tensor, "2 10
     return torch.stack(boundary)
 
 
-def _line(draw: "object", lat: Tensor, colour: str, width: int) -> None:
+def _line(draw: Any, lat: Tensor, colour: str, width: int) -> None:
     rows = (0.5 - lat / math.pi) * _LINES
     points = [(column + 0.5, row) for column, row in enumerate(rows.tolist())]
-    draw.line(points, fill=colour, width=width)  # pyright: ignore[reportAttributeAccessIssue]
+    draw.line(points, fill=colour, width=width)
 
 
-def _plan(draw: "object", prediction: LayoutPrediction, truth: Scene | None) -> None:
+def _plan(draw: Any, prediction: LayoutPrediction, truth: Scene | None) -> None:
     """Draw the floor plans, from above, into the square at the right."""
     layout = prediction.layout
     shown = [(layout.floor_polygon, _FOUND, 2)]
@@ -84,14 +85,13 @@ def _plan(draw: "object", prediction: LayoutPrediction, truth: Scene | None) -> 
         offset = (polygon - middle) * scale
         return [(1024 + _LINES / 2 + x, _LINES / 2 - y) for x, y in offset.tolist()]
 
-    ink: object = draw
-    ink.polygon(placed(shown[0][0]), fill=FLOOR, outline=WALL)  # pyright: ignore
+    draw.polygon(placed(shown[0][0]), fill=FLOOR, outline=WALL)
     for polygon, colour, width in shown:
         closed = torch.cat((polygon, polygon[:1]))
-        ink.line(placed(closed), fill=colour, width=width)  # pyright: ignore
+        draw.line(placed(closed), fill=colour, width=width)
     x, y = placed(torch.zeros(1, 2))[0]
-    ink.ellipse((x - 4, y - 4, x + 4, y + 4), fill=INK)  # pyright: ignore
+    draw.ellipse((x - 4, y - 4, x + 4, y + 4), fill=INK)
     words = f"{len(layout.floor_polygon)} corners, ceiling {layout.ceiling_height:.2f} m"
     if prediction.ambiguous:
         words += ", ambiguous"
-    ink.text((1032, 8), words, fill=INK)  # pyright: ignore
+    draw.text((1032, 8), words, fill=INK)

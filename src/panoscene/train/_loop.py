@@ -94,7 +94,7 @@ class _Samples(Dataset[Any]):
     def __init__(self, task: Task) -> None:
         self._task = task
 
-    def __getitem__(self, key: SampleKey) -> Any:
+    def __getitem__(self, key: SampleKey) -> Any:  # ty: ignore[lost-keyword-for-regular-parameter]
         return self._task.sample(key.sample, generator_of(key))
 
 
@@ -114,7 +114,7 @@ class _Training:
             self.task = task_of(recipe)
         model = self.task.model
         if recipe.channels_last:
-            model.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+            model.to(memory_format=torch.channels_last)
         self.optimiser: Optimizer = make_optimiser(self.task, recipe)
         self.losses, self.steps = fabric.setup(_Losses(self.task), self.optimiser)
         self.average = WeightAverage(model, recipe.ema) if recipe.ema else None

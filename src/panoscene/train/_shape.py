@@ -83,6 +83,8 @@ class ShapeOptions(BaseModel):
 class ShapeTask(Task):
     """Seen models in panoramas and in pictures of their own; scores on others."""
 
+    model: ShapeNetwork  # ty: ignore[incompatible-mutable-override]
+
     def __init__(self, recipe: TrainRecipe) -> None:
         self.options = recipe.stage_options(ShapeOptions)
         self.network_config = CONFIGS[recipe.edition]
@@ -104,7 +106,7 @@ class ShapeTask(Task):
         self.validation_crops = _crops(folder, "val")
         self.entries = self._entries()
         self.weights = ShapeWeights(near=self.options.near_weight)
-        self.model: ShapeNetwork = build_shape(  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.model = build_shape(
             self.network_config, imagenet=recipe.imagenet and recipe.start is None
         )
         if recipe.start is not None:

@@ -55,9 +55,7 @@ def _drawn(
     x, y = torch.meshgrid(step, -step, indexing="xy")
     origin = 1.5 * (x[..., None] * right + y[..., None] * up).reshape(-1, 3) + 3 * back
     towards = (-back).expand(len(origin), 3)
-    triangle, ray = mesh.ray.intersects_id(  # pyright: ignore[reportAssignmentType]
-        origin.numpy(), towards.numpy(), multiple_hits=False
-    )
+    triangle, ray = mesh.ray.intersects_id(origin.numpy(), towards.numpy(), multiple_hits=False)
     lamp = F.normalize(torch.tensor([-0.2, 0.6, 0.9]), dim=0).double().numpy()
     normal = np.asarray(mesh.face_normals)[triangle]
     light = 0.35 + 0.5 * np.clip(normal @ lamp, 0, 1) + 0.2 * np.abs(normal @ back.numpy())

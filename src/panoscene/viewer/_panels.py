@@ -27,7 +27,9 @@ PRESET_ORDER = ("default", "released", "paper")
 class Panels:
     """Every control, and what they show."""
 
-    def __init__(self, gui: viser.GuiApi, editor: Editor, *, photo: bool, save_to: Path | None):
+    def __init__(
+        self, gui: viser.GuiApi, editor: Editor, *, photo: bool, save_to: Path | None
+    ) -> None:
         self._opened = measure_scene(editor.opened).violations
         with gui.add_folder("Certificate"):
             self.history = gui.add_button_group("History", HISTORY, hint="Ctrl+Z, Ctrl+Shift+Z")

@@ -170,7 +170,7 @@ def draw_key(page: Page, rows: Sequence[Row], x: float, top: float, width: float
             page.text(x + left, middle, text, size=size, colour=FAINT_INK)
         elif row.kind == "mark":
             _draw_mark(page, row.text, x, middle)
-            text = _MARKS[row.text]  # pyright: ignore[reportArgumentType]
+            text = _MARKS[row.text]  # ty: ignore[invalid-argument-type]
             page.text(x + indent, middle, text, size=BODY * shrink)
 
 

@@ -292,7 +292,7 @@ def _meets(items: np.ndarray, shapes: np.ndarray, reach: shapely.Geometry) -> np
     if not len(near):
         return np.zeros(len(items), dtype=bool)
     met = np.asarray(shapely.intersects(items[:, None], near[None, :]))
-    return np.any(met, axis=1)  # pyright: ignore[reportReturnType]
+    return np.any(met, axis=1)
 
 
 def _in_two_lines(name: str) -> str:

@@ -162,7 +162,7 @@ def test_calibration_makes_probabilities_mean_what_they_say() -> None:
     generator = torch.Generator().manual_seed(0)
     _, target = furnished()
     scenes, n, m = 200, 6, 4
-    shapes = dict.fromkeys(RELATIONS, (scenes, n))
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(RELATIONS, (scenes, n))
     shapes |= dict.fromkeys(("touching", "farther_than"), (scenes, n, n))
     shapes |= {"touching_wall": (scenes, n, m)}
     shapes |= {"relative_yaw": (scenes, n, n, 8), "relative_yaw_wall": (scenes, n, m, 8)}

@@ -97,7 +97,7 @@ def test_coco_weights_are_finite_numbers(tmp_path: Path, value: float, message: 
 @pytest.mark.parametrize("name", ["tf_efficientnet_lite0", "resnet18"])
 def test_folded_norms_change_nothing(name: str) -> None:
     generator = torch.Generator().manual_seed(0)
-    backbone: Backbone = build_backbone(name).eval()  # pyright: ignore[reportArgumentType]
+    backbone: Backbone = build_backbone(name).eval()  # ty: ignore[invalid-argument-type]
     for module in backbone.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
             assert module.running_mean is not None

@@ -97,7 +97,7 @@ def test_hidden_corners_are_inferred() -> None:
     assert len(found.floor_polygon) == 6
     assert found.wall_score is not None
     assert float(found.wall_score.min()) < 0.1  # the wall that nothing sees
-    drawn = polygon_iou(found.raw_polygon.double(), room)  # pyright: ignore
+    drawn = polygon_iou(found.raw_polygon.double(), room)  # ty: ignore[missing-union-attribute]
     assert polygon_iou(found.floor_polygon.double(), room) > drawn
 
 
@@ -109,7 +109,7 @@ def test_a_round_room_keeps_its_drawn_polygon() -> None:
     found = room_from_signals(*signals(room), 1.6)
     polygon = found.layout.floor_polygon.double()
     assert polygon_iou(polygon, room) > 0.8
-    assert found.regular or torch.equal(polygon, found.layout.raw_polygon.double())  # pyright: ignore
+    assert found.regular or torch.equal(polygon, found.layout.raw_polygon.double())  # ty: ignore[missing-union-attribute]
 
 
 def test_size_follows_the_camera_height() -> None:

@@ -193,7 +193,7 @@ def test_estimates_repeat_and_leave_the_photo_alone() -> None:
     assert torch.equal(image, before)
     assert dataclasses.is_dataclass(first)
     with pytest.raises(dataclasses.FrozenInstanceError):
-        first.tilt = 0.0  # pyright: ignore[reportAttributeAccessIssue]
+        first.tilt = 0.0  # ty: ignore[invalid-assignment]
 
 
 def test_large_and_double_precision_photos_are_taken() -> None:

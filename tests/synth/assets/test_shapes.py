@@ -35,7 +35,7 @@ def model(mesh: trimesh.Trimesh, placement: str = "floor") -> CadModel:
         face_material=np.zeros(len(mesh.faces), np.int16),
         materials=(Material("m"),),
         size=(float(size[0]), float(size[1]), float(size[2])),
-        placement=placement,  # type: ignore[arg-type]
+        placement=placement,  # ty: ignore[invalid-argument-type]
     )
 
 

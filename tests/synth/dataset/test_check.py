@@ -200,7 +200,7 @@ def test_a_good_panorama_passes(good: Loaded):
     assert {name: check(good) for name, check in CHECKS.items()} == {name: [] for name in CHECKS}
 
 
-@pytest.mark.parametrize(("check", "broken"), BREAKS, ids=[f"{c}-{b.__name__}" for c, b in BREAKS])
+@pytest.mark.parametrize(("check", "broken"), BREAKS, ids=[f"{c}-{b.__name__}" for c, b in BREAKS])  # ty: ignore[missing-attribute]
 def test_a_broken_panorama_is_caught(good: Loaded, check: str, broken):
     assert CHECKS[check](broken(good))
 

@@ -173,7 +173,7 @@ def test_missing_and_damaged_files_are_named(small_set: Path, tmp_path: Path):
     with pytest.raises(DatasetError, match=r"dataset\.json"):
         open_dataset(tmp_path)
     with pytest.raises(ValueError, match="training"):
-        open_dataset(small_set, "training")  # pyright: ignore
+        open_dataset(small_set, "training")
     copy = tmp_path / "copy"
     shutil.copytree(small_set, copy)
     item = open_dataset(copy)[0]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from panoscene.synth.homes import Home, Placed, Room
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
-def model_of(identifier: str, category: str, boxes: list[Box], **details: object) -> CadModel:
+def model_of(identifier: str, category: str, boxes: list[Box], **details: Any) -> CadModel:
     """Return a model of boxes given by extents and lowest corners, in a frame of its own."""
     parts = []
     for extents, low in boxes:
@@ -30,7 +31,7 @@ def joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 
 def model_of_mesh(
-    identifier: str, category: str, mesh: trimesh.Trimesh, **details: object
+    identifier: str, category: str, mesh: trimesh.Trimesh, **details: Any
 ) -> CadModel:
     vertices = np.array(mesh.vertices)
     vertices = (vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2).astype(np.float32)
@@ -46,7 +47,7 @@ def model_of_mesh(
         face_material=np.zeros(len(mesh.faces), np.int16),
         materials=(Material("plain"),),
         size=(width, depth, height),
-        **details,  # type: ignore[arg-type]
+        **details,
     )
 
 
@@ -102,10 +103,10 @@ Put = Callable[..., Placed]
 def put(models: dict[str, CadModel]) -> Put:
     """Return a function that places a model by its lower edge."""
 
-    def place(name: str, x: float, y: float, low: float = 0.0, **details: object) -> Placed:
-        height = models[name].size[2] * details.get("scale", (1, 1, 1))[2]  # type: ignore[index]
+    def place(name: str, x: float, y: float, low: float = 0.0, **details: Any) -> Placed:
+        height = models[name].size[2] * details.get("scale", (1, 1, 1))[2]
         details = {"room": 0, "yaw": 0.0, **details}
-        return Placed(name, position=(x, y, low + height / 2), **details)  # type: ignore[arg-type]
+        return Placed(name, position=(x, y, low + height / 2), **details)
 
     return place
 

@@ -73,7 +73,7 @@ def test_every_panorama_is_counted_and_its_extra_files_are_written(
     assert len(set(written)) == 8
     assert lines[0] == "rendering 4 homes"
     assert lines[-1] == "rendered 8 of 8 panoramas"
-    (peak,) = found["peak_gib"]  # type: ignore[misc]
+    (peak,) = found["peak_gib"]  # ty: ignore[not-iterable]
     assert 0.05 < peak < 8
     json.dumps(found)
     table = synth_benchmark_table(found)

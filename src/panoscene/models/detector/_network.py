@@ -63,4 +63,4 @@ def build_detector(config: DetectorConfig, *, imagenet: bool | Path = False) -> 
     """
     network = DetectorNetwork(config, imagenet)
     make_pointwise(network)
-    return network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+    return network.to(memory_format=torch.channels_last)

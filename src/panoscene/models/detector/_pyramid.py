@@ -104,9 +104,7 @@ def _convolutions_before_norms(backbone: Backbone) -> dict[str, nn.Conv2d]:
     for name, module in backbone.named_modules():
         if isinstance(module, nn.Conv2d):
             hooks.append(
-                module.register_forward_hook(
-                    lambda conv, _, out: made.append((out, conv))  # pyright: ignore
-                )
+                module.register_forward_hook(lambda conv, _, out: made.append((out, conv)))
             )
         elif isinstance(module, nn.BatchNorm2d):
 

@@ -123,5 +123,5 @@ def load_layout_stage(
     read_weights(path, network, stage=STAGE, edition=edition)
     network.to(device)
     if device == "cpu":
-        network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        network.to(memory_format=torch.channels_last)
     return LayoutStage(network)

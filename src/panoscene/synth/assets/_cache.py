@@ -222,7 +222,7 @@ def read_model(cache: Path, file: str) -> CadModel:
         placement=head["placement"],
         elevation=float(head["elevation"]),
         support_height=head["support_height"],
-        lights=tuple(LightSource(x[:3], x[3], x[4:7]) for x in numbers),  # type: ignore[arg-type]
+        lights=tuple(LightSource(x[:3], x[3], x[4:7]) for x in numbers),  # ty: ignore[invalid-argument-type]
         has_front=head["has_front"],
         licence=head["licence"],
         creator=head["creator"],

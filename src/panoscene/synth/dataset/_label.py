@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -151,7 +152,7 @@ def label_panorama(
             camera.height,
             height,
             None,
-            _rows(upright_from_photo(camera)),  # pyright: ignore
+            _rows(upright_from_photo(camera)),
         ),
         layout=layout,
         objects=_objects(views, objects, order, boxes, seen),
@@ -220,7 +221,7 @@ def _object_labels(
                 creator=thing.creator,
                 source=thing.source,
                 room=thing.room,
-                world_from_object=_rows(view.world_from_object),  # pyright: ignore
+                world_from_object=_rows(view.world_from_object),
                 box=BoxLabel(
                     centre=_rounded(view.box.centre),
                     size=_rounded(view.box.size),
@@ -234,7 +235,7 @@ def _object_labels(
                 amodal_solid_angle=round(view.amodal_solid_angle, _DIGITS),
                 occlusion=round(1 - min(view.solid_angle / view.amodal_solid_angle, 1.0), 4),
                 hull_share=round(view.hull_share, 4),
-                truncated=view.truncated,  # pyright: ignore
+                truncated=view.truncated,  # ty: ignore[invalid-argument-type]
                 inside_room=bool(relations.inside_room[k] > 0.5),
                 in_scene=not failed,
                 left_out=tuple(failed),
@@ -354,7 +355,7 @@ def _camera_label(camera: Camera, room_kind: str) -> CameraLabel:
     )  # fmt: skip
 
 
-def _rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
+def _rows(matrix: np.ndarray) -> tuple[tuple[Any, ...], ...]:
     return tuple(_rounded(row) for row in (matrix + 0.0).tolist())
 
 

@@ -48,7 +48,7 @@ class FloorGrid:
     def _labels(self, things: Float[np.ndarray, "things 4"]) -> tuple[Int[np.ndarray, "x y"], int]:
         free = self._free.copy()
         self._block(free, things)
-        labels, count = ndimage.label(free)  # pyright: ignore[reportGeneralTypeIssues]
+        labels, count = ndimage.label(free)
         return np.asarray(labels), int(count)
 
     def _block(self, free: Bool[np.ndarray, "x y"], boxes: Float[np.ndarray, "boxes 4"]) -> None:

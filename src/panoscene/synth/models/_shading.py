@@ -75,7 +75,7 @@ def _corner_normals(
     mine, face_other = mine[near], face_other[near]
     total = [np.bincount(mine, area_normal[face_other, k], len(group)) for k in range(3)]
     summed = np.stack(total, axis=1)
-    summed /= np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-15)
+    summed = summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-15)
     result = np.zeros_like(summed)
     result[order] = summed
     return result
