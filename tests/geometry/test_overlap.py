@@ -17,6 +17,7 @@ from panoscene.geometry._oriented_boxes import OrientedBoxes
 from panoscene.geometry._overlap import (
     box_intersection_volume,
     box_iou,
+    box_nms,
     paired_box_iou,
     paired_intersection_volume,
     rectangle_intersection_area,
@@ -212,3 +213,15 @@ def test_many_pairs_take_well_under_a_second(generator: torch.Generator) -> None
         box_iou(a, b)
         seconds.append(time.process_time() - start)
     assert min(seconds) < 1.0
+
+
+def test_nms_of_boxes_keeps_the_best_of_each_place_and_category():
+    centre = torch.tensor([[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.6, 0.0, 1.0], [5.0, 0.0, 1.0]])
+    boxes = OrientedBoxes(centre, torch.ones(4, 3), torch.zeros(4))  # IoU 0.54 side by side
+    score = torch.tensor([0.9, 0.8, 0.7, 0.1])
+    assert box_nms(boxes, score, iou_threshold=0.5).tolist() == [0, 2, 3]
+    category = torch.tensor([1, 2, 2, 1])
+    assert box_nms(boxes, score, category, iou_threshold=0.5).tolist() == [0, 1, 3]
+    assert box_nms(boxes[:0], score[:0], iou_threshold=0.5).tolist() == []
+    with pytest.raises(ValueError, match=r"iou_threshold: found 1\.5"):
+        box_nms(boxes, score, iou_threshold=1.5)

@@ -46,6 +46,7 @@ from panoscene.geometry._mesh_edges import edge_neighbours as edge_neighbours
 from panoscene.geometry._oriented_boxes import OrientedBoxes as OrientedBoxes
 from panoscene.geometry._overlap import box_intersection_volume as box_intersection_volume
 from panoscene.geometry._overlap import box_iou as box_iou
+from panoscene.geometry._overlap import box_nms as box_nms
 from panoscene.geometry._overlap import paired_box_iou as paired_box_iou
 from panoscene.geometry._overlap import paired_intersection_volume as paired_intersection_volume
 from panoscene.geometry._overlap import rectangle_intersection_area as rectangle_intersection_area

@@ -9,6 +9,7 @@ from torch import Tensor
 from panoscene.geometry._bfov import bfov_area, bfov_candidates, bfov_contains, smallest_bfov
 from panoscene.geometry._bfov_arcs import arcs_intersection_area, border_arcs
 from panoscene.geometry._sphere import camera_from_turned, direction_from_lonlat
+from panoscene.geometry._suppression import suppress
 
 _PAIRS_AT_ONCE = 4096  # keeps the working memory below about 50 MB
 # regions are shrunk by these fractions first, so that no two borders coincide: everything below
@@ -99,21 +100,7 @@ def bfov_nms(
         >>> bfov_nms(bfov, torch.tensor([0.5, 0.9, 0.7]), iou_threshold=0.4).tolist()
         [1, 2]
     """
-    if not 0 <= iou_threshold <= 1:
-        raise ValueError(f"iou_threshold: found {iou_threshold}, expected a number in [0, 1]")
-    if not score.isfinite().all():
-        raise ValueError("score: found a value that is not finite")
-    order = score.argsort(descending=True, stable=True)
-    rival = (bfov_iou(bfov[order], bfov[order]) > iou_threshold).triu(1)
-    if category is not None:
-        rival &= category[order, None] == category[order]
-    # greedy suppression is the one fixed point: each pass settles at least one more BFoV, and in
-    # practice the passes are as many as the longest chain of overlaps
-    kept, previous = torch.ones_like(order, dtype=torch.bool), None
-    while previous is None or bool((kept != previous).any()):
-        previous = kept
-        kept = ~(rival & previous[:, None]).any(0)
-    return order[kept]
+    return suppress(bfov_iou(bfov, bfov), score, category, iou_threshold)
 
 
 def bfov_union(

@@ -1,12 +1,13 @@
 """Exact intersection of upright boxes: area on the floor, volume and IoU."""
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from panoscene.geometry._boxes import box_volume
 from panoscene.geometry._oriented_boxes import OrientedBoxes
 from panoscene.geometry._separation import separation_margins
+from panoscene.geometry._suppression import suppress
 
 SHORTEST_EDGE = 1e-12
 """An edge that advances less than this many metres along an axis counts as perpendicular to it."""
@@ -98,6 +99,36 @@ def box_iou(a: OrientedBoxes, b: OrientedBoxes) -> Float[Tensor, "n m"]:
         [[1.0], [1.0]]
     """
     return paired_box_iou(a[:, None], b[None, :])
+
+
+def box_nms(
+    boxes: OrientedBoxes,
+    score: Float[Tensor, " n"],
+    category: Int[Tensor, " n"] | None = None,
+    *,
+    iou_threshold: float,
+) -> Int[Tensor, " kept"]:
+    """Return the indices kept by greedy non-maximum suppression in 3D, by descending score.
+
+    A box falls when a kept one of higher score, and of the same category when categories are
+    given, overlaps it by more than the threshold. Equal scores keep their order.
+
+    Args:
+        boxes: n of them.
+        score: Confidence of each box.
+        category: Class of each box; without it all of them compete.
+        iou_threshold: Largest 3D IoU that two kept boxes may have, in [0, 1].
+
+    Raises:
+        ValueError: If the threshold is outside [0, 1] or a score is not finite.
+
+    Examples:
+        >>> centre = torch.tensor([[0.0, 0.0, 1.0], [0.1, 0.0, 1.0], [3.0, 0.0, 1.0]])
+        >>> boxes = OrientedBoxes(centre, torch.ones(3, 3), torch.zeros(3))
+        >>> box_nms(boxes, torch.tensor([0.5, 0.9, 0.7]), iou_threshold=0.3).tolist()
+        [1, 2]
+    """
+    return suppress(box_iou(boxes, boxes), score, category, iou_threshold)
 
 
 def _footprint_in(a: OrientedBoxes, b: OrientedBoxes) -> list[tuple[Tensor, Tensor]]:

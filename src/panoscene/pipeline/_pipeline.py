@@ -22,6 +22,7 @@ from panoscene.scene import (
     upright_photo,
 )
 
+from ._doubles import without_doubles
 from ._flags import photo_flags, scene_flags
 from ._records import Given, Reconstruction
 from ._relations import final_relations, held_relations
@@ -121,6 +122,8 @@ class Pipeline:
             with clock("pose" if self._stages.context is None else "context"):
                 objects, relations = self._placed(seen, found, layout, panorama.camera_height)
         initial = Scene(panorama, layout, objects, given.relations or relations, name)
+        if given.objects is None and given.detections is None and given.relations is None:
+            initial = without_doubles(initial)
         scene, certificate = self._arranged(initial, clock)
         flags = photo_flags(gaps, tilt) + scene_flags(read, scene)
         return Reconstruction(scene, initial, seen, certificate, read, clock.seconds, flags)
