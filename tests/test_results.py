@@ -24,13 +24,13 @@ def test_the_pages_of_results_are_up_to_date(root: Path) -> None:
 
 
 def test_the_code_still_gives_the_committed_scores(root: Path, tmp_path: Path) -> None:
-    """Three rooms stand for all: rooms and errors depend on seed and number only.
+    """Two rooms stand for all: rooms and errors depend on seed and number only.
 
     After a change that is meant to change scores, make ``results/simulated`` again, and ``first``
-    with ``panoscene eval export -o runs/first --scenes 3 --methods`` with those of
+    with ``panoscene eval export -o runs/first --scenes 2 --methods`` with those of
     ``FIRST`` and ``panoscene eval score runs/first -o results/simulated/first --replicates 0``.
     """
-    export = ["eval", "export", "-o", str(tmp_path / "run"), "--scenes", "3"]
+    export = ["eval", "export", "-o", str(tmp_path / "run"), "--scenes", "2"]
     assert main([*export, "--methods", ",".join(FIRST)]) == 0
     score = ["eval", "score", str(tmp_path / "run"), "-o", str(tmp_path / "scores")]
     assert main([*score, "--replicates", "0", "--workers", "1"]) == 0
