@@ -22,14 +22,14 @@ CLEARANCE = 0.05
 """Camera heights that a room leaves around the camera."""
 SURE = math.radians(2.0)
 """Latitude error at which the score of a wall has fallen to 1 / e."""
-AS_GOOD = 12.0
+AS_GOOD = 30.0
 """Cost by which another room may be worse and still be plausible."""
 ALIKE = 0.85
 """IoU of two rooms from which they count as one reading."""
 TORN = math.log(1.4)
 """Logarithm of the ratio of the distances that floor and ceiling tell where they contradict."""
-TORN_COLUMNS = 1 / 36
-"""Part of the panorama in which they must (10 degrees)."""
+TORN_COLUMNS = 1 / 72
+"""Part of the panorama in which they must (5 degrees)."""
 
 
 @dataclass(frozen=True, slots=True)
