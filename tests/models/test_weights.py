@@ -155,3 +155,10 @@ def test_what_a_file_says_of_its_network_is_checked_by_all_stages(
         load("paper", file)
     with pytest.raises(CheckpointError, match=f"{stage}-paper.*none come with the paper edition"):
         load("paper")
+
+
+def test_a_load_draws_no_random_numbers() -> None:
+    before = torch.get_rng_state()
+    network = load_layout_stage().network
+    assert torch.equal(torch.get_rng_state(), before)
+    assert all(bool(value.isfinite().all()) for value in network.state_dict().values())

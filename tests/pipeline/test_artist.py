@@ -9,18 +9,41 @@ from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
+import torch
 
 from panoscene.cli._artist import artist
 
 
-def test_tasks_are_done_in_another_process(capfd: pytest.CaptureFixture[str]) -> None:
-    with artist("json") as drawing:
+@pytest.mark.parametrize("fork", [False, True])
+def test_tasks_are_done_in_another_process(
+    capfd: pytest.CaptureFixture[str], *, fork: bool
+) -> None:
+    with artist("json", fork=fork) as drawing:
         process = drawing.submit(os.getpid)
         assert list(drawing.map(operator.mul, (2, 3), (5, 7))) == [10, 21]
         # what a library prints is not among the results of the command
         drawing.submit(os.write, 1, b"drawing").result(60)
         assert process.result(60) != os.getpid()
     assert capfd.readouterr() == ("", "drawing")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems start again")
+def test_a_fork_has_what_is_loaded_here_and_works_with_one_thread() -> None:
+    ones = torch.ones(300, 300)
+    product = ones @ ones
+    _LOADED.append(os.getpid())
+    with artist(fork=True) as drawing:
+        assert drawing.submit(_loaded).result(60) == _LOADED
+        assert drawing.submit(torch.get_num_threads).result(60) == 1
+        # threads that a library has here are not there, and nobody waits for them
+        assert torch.equal(drawing.submit(torch.mm, ones, ones).result(60), product)
+
+
+_LOADED: list[int] = []
+
+
+def _loaded() -> list[int]:
+    return _LOADED
 
 
 def test_what_a_task_raises_is_raised_here() -> None:
@@ -51,12 +74,13 @@ def test_leaving_gives_up_what_has_not_begun() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_it_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("fork", [False, True])
+def test_it_ends_with_the_process_that_started_it(tmp_path: Path, *, fork: bool) -> None:
     code = f"""
 import os, signal
 from pathlib import Path
 from panoscene.cli._artist import artist
-with artist() as drawing:
+with artist(fork={fork}) as drawing:
     Path({str(tmp_path / "pid")!r}).write_text(str(drawing.submit(os.getpid).result()))
     os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -101,6 +103,26 @@ def test_a_bad_photo_does_not_stop_the_others(run: Run, photo: Path, tmp_path: P
     assert [told[name]["ok"] for name in ("cut", "good", "square")] == [False, True, False]
     assert [folder.name for folder in (tmp_path / "rooms").iterdir()] == ["good"]
     assert {file.name for file in (tmp_path / "rooms" / "good").iterdir()} == FILES
+
+
+def test_what_is_wrong_is_told_before_torch_is_loaded(photo: Path, tmp_path: Path) -> None:
+    (tmp_path / "cut.jpg").write_bytes(photo.read_bytes()[:500])
+    wrong = (["nowhere.jpg"], [tmp_path / "cut.jpg", "nowhere.jpg"], [photo, "--steps", "-1"])
+    for arguments in wrong:
+        given = ["reconstruct", *map(str, arguments), "-o", str(tmp_path / "room")]
+        code = f"""
+import sys
+from panoscene.cli import main
+code = main({given!r})
+print("torch" in sys.modules)
+sys.exit(code)
+"""
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        assert done.stderr.count("error: ") == sum("jpg" in str(name) for name in arguments)
+        assert done.stdout.split()[-1] == "False"
+        assert not (tmp_path / "room").exists()
 
 
 @pytest.mark.usefixtures("loaded")

@@ -4,9 +4,6 @@ from typing import Any
 
 from panoscene.pipeline import Reconstruction
 
-SCENE = "scene.json"
-"""The file that is written last: where it is, everything is."""
-
 
 def account(result: Reconstruction) -> dict[str, Any]:
     """Return how a result came about, for programs."""

@@ -4,6 +4,7 @@ import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -13,19 +14,24 @@ from threading import Thread
 
 
 @contextmanager
-def artist(*modules: str) -> Iterator[ProcessPoolExecutor]:
+def artist(*modules: str, fork: bool = False) -> Iterator[ProcessPoolExecutor]:
     """Give what runs one task after the other in a process of its own.
 
-    Libraries take seconds to import and drawing holds the interpreter, so threads of one process
-    would wait for each other. Tasks that have not begun when the block is left are given up.
+    Drawing holds the interpreter, so threads of one process would wait for each other. Tasks that
+    have not begun when the block is left are given up.
 
     Args:
         modules: that the process imports at once, while nobody asks for anything.
+        fork: On Linux, begin with the libraries that are loaded here, instead of seconds later.
+            Nothing but this thread may be at work here.
     """
-    context = get_context("spawn")
+    context = get_context("fork" if fork and sys.platform == "linux" else "spawn")
     pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin)
     try:
-        pool.submit(_import, modules)
+        with warnings.catch_warnings():
+            # Python 3.12 and later warn of any thread, as those of NumPy that wait for work
+            warnings.simplefilter("ignore", DeprecationWarning)
+            pool.submit(_import, modules)
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
@@ -38,6 +44,7 @@ def _begin() -> None:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     # whatever a library prints must not get between the results of the command
     os.dup2(2, 1)
+    _leave_cores()
 
 
 def _follow() -> None:
@@ -51,6 +58,10 @@ def _follow() -> None:
 def _import(modules: tuple[str, ...]) -> None:
     for module in modules:
         import_module(module)
+    _leave_cores()
+
+
+def _leave_cores() -> None:
+    """Let the networks, in the other process, have the other cores."""
     if torch := sys.modules.get("torch"):
-        # the networks need the other cores
         torch.set_num_threads(1)

@@ -4,12 +4,12 @@ import errno
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from panoscene.cli._errors import InputError
+from panoscene.cli._folders import check_folder
 from panoscene.scene import (
     PanoramaError,
     Scene,
@@ -137,29 +137,6 @@ def scene_targets(files: Sequence[Path], output: Path) -> Mapping[Path, Path]:
             )
         sources[name] = file
     return {file: output / name for name, file in sources.items()}
-
-
-def check_folder(output: Path) -> None:
-    """Refuse an output that is not a folder and cannot become one, before the work and not after.
-
-    Raises:
-        InputError: There is a file of that name, or nothing can be written there.
-    """
-    if output.exists() and not output.is_dir():
-        raise InputError(f"--output {output}: found a file, expected a folder")
-    missing = [folder for folder in (output, *output.parents) if not folder.exists()]
-    try:
-        # whoever fails later leaves no empty folder
-        output.mkdir(parents=True, exist_ok=True)
-        TemporaryFile(dir=output).close()
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        expected = "expected a folder to write into"
-        raise InputError(f"--output {output}: cannot be written: {reason}; {expected}") from None
-    finally:
-        for folder in missing:
-            with suppress(OSError):
-                folder.rmdir()
 
 
 def beside(target: Path, ending: str) -> Path:

@@ -28,7 +28,7 @@ OBJECTS = 20
 """In the room whose stages are measured."""
 RESOLUTIONS = (64, 128)
 """Of the meshes of the stages."""
-_COMMAND = "import sys; from panoscene.cli import main; sys.exit(main())"
+_COMMAND = "from panoscene.cli import run; run()"
 
 Progress = Callable[[str], None]
 

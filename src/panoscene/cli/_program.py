@@ -19,6 +19,7 @@ from panoscene.cli._commands import (
     relations,
     schema,
 )
+from panoscene.cli._ending import ENDING
 from panoscene.cli._errors import InputError
 from panoscene.cli._eval_commands import export, report, score
 from panoscene.cli._eval_commands import reconstruct as eval_reconstruct
@@ -134,6 +135,20 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         complain(str(error))
     return USAGE
+
+
+def run() -> None:
+    """Run the command that this process was started for; its exit code becomes the process's.
+
+    When everything is written the process ends at once.
+    """
+    # that of an error, until it is known better
+    ENDING.code = 1
+    try:
+        ENDING.code = main()
+    except SystemExit as asked:
+        ENDING.code = asked.code if isinstance(asked.code, int) else int(asked.code is not None)
+        raise
 
 
 def _run(arguments: list[str]) -> int:

@@ -1,35 +1,29 @@
-"""Photos in, scenes out: files for people and programs, in one folder for each photo."""
+# ruff: noqa: PLC0415
+# The imports stand inside: who names a photo that cannot be used does not wait for torch.
+"""Photos in, scenes out: which photos, where their results go, and what came of each."""
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+from panoscene._photo import PanoramaError, read_photo
 from panoscene._ray import ray_cluster, ray_package, ray_result, spread
-from panoscene.cli._account import SCENE, account
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder
+from panoscene.cli._folders import check_folder
+from panoscene.cli._importing import importing
 from panoscene.cli._progress import progress_bar
 from panoscene.cli._terminal import complain, note, say, say_json
-from panoscene.pipeline import Pipeline, Reconstruction, load_steps
-from panoscene.scene import (
-    CATEGORIES,
-    PanoramaError,
-    SceneFormatError,
-    read_panorama,
-)
-from panoscene.style import words
 
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp"})
 ENOUGH_COLUMNS = 4096
 """Of a photo: networks see 1,024, and 16,384 take gigabytes."""
-_RESULTS = "panoscene.cli._results"
+SCENE = "scene.json"
+"""The file that is written last: where it is, everything is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,14 +106,14 @@ class Outcome:
 
 
 def reconstruct_files(
-    make: Callable[[], Pipeline],
+    make: Callable[[], Any],
     files: Sequence[Path],
     output: Path,
     choice: Choice,
     *,
     as_json: bool,
     ray: str | None = None,
-    artist: Executor | None = None,
+    artist: Callable[[], AbstractContextManager[Executor]] | None = None,
 ) -> int:
     """Reconstruct photos, say what was found, and return the exit code.
 
@@ -131,21 +125,31 @@ def reconstruct_files(
         as_json: print the outcomes as JSON.
         ray: address of a Ray cluster to spread the photos over, "" for the one that is running
             here; None works on them in this process.
-        artist: draws pictures; None draws them in this process, as on a cluster.
+        artist: gives who draws pictures; None draws them in this process, as on a cluster.
     """
     folders = photo_folders(files, output)
     tasks = [Task(file, folders[file], choice) for file in files]
-    left = [task for task in tasks if not (choice.resume and task.done())]
+    left = deque(task for task in tasks if not (choice.resume and task.done()))
     told: dict[Path, dict[str, Any]] = {}
-    with progress_bar("reconstructing", len(left)) as advance:
-        for task, outcome in _outcomes(make, left, ray, artist):
-            told[task.file] = outcome.entry
-            if "error" in outcome.entry:
-                complain(outcome.entry["error"])
-            for flag in outcome.entry.get("flags", ()):
-                note(f"{task.file}: {flag['text']}")
-            for line in () if as_json else outcome.text:
-                say(line)
+
+    def tell(task: Task, outcome: Outcome) -> None:
+        told[task.file] = outcome.entry
+        if "error" in outcome.entry:
+            complain(outcome.entry["error"])
+        for flag in outcome.entry.get("flags", ()):
+            note(f"{task.file}: {flag['text']}")
+        for line in () if as_json else outcome.text:
+            say(line)
+
+    # nobody waits for libraries that no photo needs
+    while ray is None and left and (refusal := _refusal(left[0])) is not None:
+        tell(left.popleft(), refusal)
+    with (
+        _working(make, left, ray, artist) as outcomes,
+        progress_bar("reconstructing", len(left)) as advance,
+    ):
+        for task, outcome in outcomes:
+            tell(task, outcome)
             advance(1)
     entries = [told.get(task.file) or _there(task) for task in tasks]
     if as_json:
@@ -156,42 +160,52 @@ def reconstruct_files(
     return 0 if all(entry["ok"] for entry in entries) else 2
 
 
-@contextmanager
-def _ahead(pipeline: Pipeline) -> Iterator[None]:
-    """Load in another thread what the first photo needs later than it is needed here."""
-    with ThreadPoolExecutor(max_workers=1) as pool:
-        for step in (*load_steps(pipeline.stages), partial(import_module, _RESULTS)):
-            pool.submit(step)
-        try:
-            yield
-        finally:
-            pool.shutdown(cancel_futures=True)
+def _refusal(task: Task) -> Outcome | None:
+    """Return what is wrong with a photo, before anything else is loaded."""
+    try:
+        read_photo(task.file, ENOUGH_COLUMNS)
+    except PanoramaError as error:
+        return failure(task, str(error))
+    return None
 
 
-def _drawing(artist: Executor | None) -> AbstractContextManager[Executor]:
-    """Return who draws: the artist, or a thread of this process."""
-    return ThreadPoolExecutor(max_workers=1) if artist is None else nullcontext(artist)
+def failure(task: Task, error: str) -> Outcome:
+    """Return that nothing came of a photo."""
+    return Outcome({"photo": str(task.file), "ok": False, "error": error})
 
 
 def _there(task: Task) -> dict[str, Any]:
     return {"photo": str(task.file), "ok": True, "output": str(task.folder), "new": False}
 
 
-def _outcomes(
-    make: Callable[[], Pipeline],
+@contextmanager
+def _working(
+    make: Callable[[], Any],
     tasks: Sequence[Task],
     ray: str | None,
-    artist: Executor | None,
-) -> Iterator[tuple[Task, Outcome]]:
-    """Return tasks with what came of them, as they finish."""
+    artist: Callable[[], AbstractContextManager[Executor]] | None,
+) -> Iterator[Iterable[tuple[Task, Outcome]]]:
+    """Give tasks with what came of them, as they finish."""
     if not tasks:
-        return
-    if ray is None:
-        pipeline = make()
-        with _ahead(pipeline), _drawing(artist) as drawing:
-            for task in tasks:
-                yield task, reconstruct_one(pipeline, task, drawing)
-        return
+        yield ()
+    elif ray is not None:
+        yield _spread(make, tasks, ray)
+    else:
+        with importing():
+            from panoscene.cli._reconstruct_photo import loading, reconstruct_photo
+        with (artist or _thread)() as drawing:
+            pipeline = make()
+            with loading(pipeline):
+                yield ((task, reconstruct_photo(pipeline, task, drawing)) for task in tasks)
+
+
+def _thread() -> AbstractContextManager[Executor]:
+    return ThreadPoolExecutor(max_workers=1)
+
+
+def _spread(
+    make: Callable[[], Any], tasks: Sequence[Task], ray: str
+) -> Iterator[tuple[Task, Outcome]]:
     # other computers start in other folders
     shared = {
         replace(task, file=task.file.resolve(), folder=task.folder.resolve()): task
@@ -204,19 +218,21 @@ def _outcomes(
             yield shared[task], _checked(shared[task], ray_result(package, reference))
 
 
-def reconstruct_there(run: str, make: Callable[[], Pipeline], task: Task) -> Outcome:
+def reconstruct_there(run: str, make: Callable[[], Any], task: Task) -> Outcome:
     """Return what came of a photo on another computer; a process makes one pipeline a run."""
+    from panoscene.cli._reconstruct_photo import reconstruct_photo
+
     if not task.file.is_file():
-        problem = f"{task.file}: not on every computer of the cluster, expected a shared folder"
-        return Outcome({"photo": str(task.file), "ok": False, "error": problem})
+        found = f"{task.file}: not on every computer of the cluster"
+        return failure(task, f"{found}, expected a shared folder")
     if run not in _MADE:
         _MADE.clear()
         _MADE[run] = make()
-    with _drawing(None) as drawing:
-        return reconstruct_one(_MADE[run], task, drawing)
+    with _thread() as drawing:
+        return reconstruct_photo(_MADE[run], task, drawing)
 
 
-_MADE: dict[str, Pipeline] = {}
+_MADE: dict[str, Any] = {}
 """The pipeline of this process, by the run that it is for."""
 
 
@@ -227,61 +243,5 @@ def _checked(task: Task, outcome: Outcome) -> Outcome:
         return Outcome(entry)
     if not task.done():
         problem = f"{task.folder}: not here, expected a folder that all computers share"
-        return Outcome({"photo": str(task.file), "ok": False, "error": problem})
+        return failure(task, problem)
     return Outcome(entry | {"output": str(task.folder)}, outcome.text)
-
-
-def reconstruct_one(pipeline: Pipeline, task: Task, artist: Executor) -> Outcome:
-    """Return what came of a photo; what is wrong with it is told and does not stop the others."""
-    file, folder, choice = task.file, task.folder, task.choice
-    try:
-        height = choice.camera_height
-        image, panorama = read_panorama(file, camera_height=height, columns=ENOUGH_COLUMNS)
-        start = time.perf_counter()
-        placed = pipeline.place(image, panorama, name=file.stem)
-        # imported meanwhile in another thread
-        from panoscene.cli._results import results  # noqa: PLC0415
-
-        with results(placed, artist) as drawn:
-            result = pipeline.shape(placed, resolution=choice.resolution)
-            seconds = time.perf_counter() - start
-            drawn.write(result, file, folder)
-    except (PanoramaError, SceneFormatError, InputError) as error:
-        return Outcome({"photo": str(file), "ok": False, "error": str(error)})
-    except OSError as error:
-        message = f"{folder}: cannot be written: {(error.strerror or str(error)).lower()}"
-        return Outcome({"photo": str(file), "ok": False, "error": message})
-    entry = {
-        "photo": str(file),
-        "ok": True,
-        "new": True,
-        "output": str(folder),
-        "objects": len(result.scene.objects.boxes),
-        "corners": len(result.scene.layout.floor_polygon),
-        **account(result),
-    }
-    return Outcome(entry, tuple(_lines(result, folder, seconds)))
-
-
-def _lines(result: Reconstruction, folder: Path, seconds: float) -> Iterator[str]:
-    """Return what was found, in sentences."""
-    from panoscene.views import describe_violations  # noqa: PLC0415 (as above)
-
-    scene = result.scene
-    names = [_name(scene, k) for k in range(len(scene.objects.boxes))]
-    counted = ", ".join(
-        f"{names.count(name)} {name}"
-        for name in sorted(set(names), key=lambda n: (-names.count(n), n))
-    )
-    corners = len(scene.layout.floor_polygon)
-    height = scene.layout.ceiling_height - scene.layout.floor_height
-    yield f"{scene.name}: a room with {corners} corners, {height:.2f} m high, in {seconds:.1f} s"
-    yield f"  {len(names)} objects: {counted}" if names else "  no objects"
-    if result.certificate is not None:
-        yield f"  before the arrangement: {describe_violations(result.certificate.before)}"
-        yield f"  after it: {describe_violations(result.certificate.after)}"
-    yield f"  open {folder / 'report.html'} in a browser; the scene is {folder / SCENE}"
-
-
-def _name(scene: Any, index: int) -> str:
-    return words(CATEGORIES[int(scene.objects.category[index])])

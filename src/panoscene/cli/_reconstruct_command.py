@@ -3,9 +3,8 @@
 """The command that turns photos into scenes."""
 
 import math
-from contextlib import nullcontext
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
@@ -14,6 +13,7 @@ from panoscene.cli._errors import InputError
 from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFile, Output
 from panoscene.cli._synth_commands import Address
 
+Edition = Literal["compact", "paper"]
 _DRAWING = (
     "panoscene.cli._results",
     "matplotlib.backends.backend_agg",
@@ -31,7 +31,7 @@ def reconstruct(
     *,
     output: Output,
     camera_height: Number = 1.6,
-    edition: Literal["compact", "paper"] = "compact",
+    edition: Edition = "compact",
     weights: OptionalFile = None,
     device: Annotated[str, arg(metavar="NAME")] = "cpu",
     steps: OptionalCount = None,
@@ -88,32 +88,37 @@ def reconstruct(
         raise InputError(f"--weights {weights}: found no folder there")
     if steps is not None and steps < 0:
         raise InputError(f"--steps: found {steps}, expected 0 or more")
-    # computers of a cluster draw themselves
-    with artist(*_DRAWING) if ray is None else nullcontext() as drawing:
-        from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
-        from panoscene.pipeline import PHOTO, load
+    from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
 
-        files = photo_files(photos)
-        photo_folders(files, output)
-        settings = PHOTO if steps is None else PHOTO.model_copy(update={"steps": steps})
-        make = partial(
-            load,
-            edition,
-            weights=weights,
-            device=checked_device(device),
-            shapes=not no_shapes,
-            level=not keep_frame,
-            settings=None if steps == 0 else settings,
-        )
-        choice = Choice(camera_height, resolution, resume)
-        try:
-            return reconstruct_files(
-                make, files, output, choice, as_json=json, ray=ray, artist=drawing
-            )
-        except ModuleNotFoundError as error:
-            if error.name != "ray":
-                raise
-            raise InputError(str(error)) from None
+    if device != "cpu":
+        checked_device(device)
+    files = photo_files(photos)
+    photo_folders(files, output)
+    make = partial(
+        _pipeline,
+        edition,
+        weights=weights,
+        device=device,
+        shapes=not no_shapes,
+        level=not keep_frame,
+        steps=steps,
+    )
+    choice = Choice(camera_height, resolution, resume)
+    # the drivers of other devices do not survive a fork; computers of a cluster draw themselves
+    drawing = partial(artist, *_DRAWING, fork=device == "cpu") if ray is None else None
+    try:
+        return reconstruct_files(make, files, output, choice, as_json=json, ray=ray, artist=drawing)
+    except ModuleNotFoundError as error:
+        if error.name != "ray":
+            raise
+        raise InputError(str(error)) from None
+
+
+def _pipeline(edition: Edition, *, steps: int | None, **options: Any) -> Any:
+    from panoscene.pipeline import PHOTO, load
+
+    settings = PHOTO if steps is None else PHOTO.model_copy(update={"steps": steps})
+    return load(edition, settings=None if steps == 0 else settings, **options)
 
 
 def checked_device(name: str) -> str:

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from panoscene.cli._account import SCENE, account
+from panoscene.cli._account import account
 from panoscene.cli._draw import draw_inside, draw_outside
 from panoscene.cli._files import write_bytes
+from panoscene.cli._reconstruct import SCENE
 from panoscene.cli._terminal import json_text
 from panoscene.exports import write_floor_plan_svg, write_glb
 from panoscene.pipeline import Reconstruction

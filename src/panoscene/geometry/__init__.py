@@ -34,6 +34,7 @@ from panoscene.geometry._boxes import box_volume as box_volume
 from panoscene.geometry._boxes import boxes_from_corners as boxes_from_corners
 from panoscene.geometry._boxes import object_from_world as object_from_world
 from panoscene.geometry._boxes import world_from_object as world_from_object
+from panoscene.geometry._components import connected_components as connected_components
 from panoscene.geometry._cube import CUBE_FACES as CUBE_FACES
 from panoscene.geometry._cube import cube_from_panorama as cube_from_panorama
 from panoscene.geometry._cube import panorama_from_cube as panorama_from_cube

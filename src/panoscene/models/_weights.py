@@ -2,13 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from torch import Tensor, nn
+from torch.nn import init
+from torch.overrides import TorchFunctionMode
 
 from panoscene.scene import write_atomically
 
@@ -20,7 +22,11 @@ SCHEMA = 1
 _KEY, _HASH = "panoscene", "sha256"
 _LISTED = 3
 _FOLDER = Path(__file__).parent / "weights"
+_RANDOM = frozenset(
+    {Tensor.normal_, Tensor.uniform_, init.normal_, init.uniform_, init.kaiming_uniform_}
+)
 Config = TypeVar("Config", bound=BaseModel)
+Network = TypeVar("Network", bound=nn.Module)
 
 
 class WeightsHeader(BaseModel):
@@ -89,18 +95,69 @@ def read_weights(path: Path, module: nn.Module, *, stage: str, edition: Edition)
     Raises:
         CheckpointError: The file is missing, damaged, or for another network.
     """
-    header, tensors, digest = _read(path)
-    _check_purpose(path, header, stage, edition)
+    file = _read(path)
+    _check_purpose(path, file.header, stage, edition)
+    _fill(module, file, path)
+    return file.header
+
+
+def load_network(
+    path: Path,
+    build: Callable[[Config], Network],
+    default: Config,
+    *,
+    stage: str,
+    edition: Edition,
+) -> Network:
+    """Return the network in a file with weights.
+
+    It is built as the file says, without the random weights that it would start a training with.
+
+    Args:
+        path: Written by ``write_weights``.
+        build: Makes a network.
+        default: What to make it from where the file says nothing.
+        stage: What the file must be for.
+        edition: Likewise.
+
+    Raises:
+        CheckpointError: The file is missing, damaged, for another network, or says what no
+            network of the stage can be built from.
+    """
+    file = _read(path)
+    _check_purpose(path, file.header, stage, edition)
+    config = _config(path, file.header, default)
+    with _Unfilled():
+        network = build(config)
+    _fill(network, file, path)
+    return network
+
+
+class _Unfilled(TorchFunctionMode):
+    """Where random numbers are not written into tensors, in this thread: it takes longest."""
+
+    def __torch_function__(
+        self, func: Any, types: Any, args: tuple[Any, ...] = (), kwargs: Any = None
+    ) -> Any:
+        kwargs = kwargs or {}
+        if func in _RANDOM:
+            return args[0] if args else kwargs["tensor"]
+        return func(*args, **kwargs)
+
+
+def _fill(module: nn.Module, file: "_File", path: Path) -> None:
+    """Fill a module with the tensors of a file; everything is checked before."""
+    tensors, header = file.tensors, file.header
     wanted = module.state_dict()
     _check_names(path, tensors, wanted)
     for name, tensor in wanted.items():
         if tensors[name].shape != tensor.shape:
             found = f"{name} of shape {_shape(tensors[name])}"
-            raise CheckpointError(path, found, f"{_shape(tensor)}, as the {edition} {stage} has")
-    if content_hash(tensors) != digest:
+            expected = f"{_shape(tensor)}, as the {header.edition} {header.stage} has"
+            raise CheckpointError(path, found, expected)
+    if content_hash(tensors) != file.digest:
         raise CheckpointError(path, "tensors that do not match their hash", "an undamaged file")
     module.load_state_dict(tensors)
-    return header
 
 
 def read_weights_header(path: Path) -> WeightsHeader:
@@ -109,24 +166,11 @@ def read_weights_header(path: Path) -> WeightsHeader:
     Raises:
         CheckpointError: The file is missing, or is no file with weights.
     """
-    return _read(path)[0]
+    return _read(path).header
 
 
-def config_of(path: Path, default: Config, *, stage: str, edition: Edition) -> Config:
-    """Return what the network in a file with weights was built from.
-
-    Args:
-        path: Written by ``write_weights``.
-        default: Of the edition: returned where the file says nothing.
-        stage: What the file must be for.
-        edition: Likewise.
-
-    Raises:
-        CheckpointError: The file is missing, damaged, for another network, or says what no
-            network of the stage can be built from.
-    """
-    header = read_weights_header(path)
-    _check_purpose(path, header, stage, edition)
+def _config(path: Path, header: WeightsHeader, default: Config) -> Config:
+    """Return what the network in a file was built from."""
     if not header.config:
         return default
     try:
@@ -134,7 +178,8 @@ def config_of(path: Path, default: Config, *, stage: str, edition: Edition) -> C
     except ValidationError as error:
         names = [".".join(map(str, fault["loc"])) or "all" for fault in error.errors()]
         found = f"a configuration with faults in {_listed(names)}"
-        raise CheckpointError(path, found, f"that of the {edition} {stage}") from None
+        expected = f"that of the {header.edition} {header.stage}"
+        raise CheckpointError(path, found, expected) from None
 
 
 def shipped_weights(stage: str) -> Path:
@@ -188,7 +233,13 @@ def content_hash(tensors: Mapping[str, Tensor]) -> str:
     return digest.hexdigest()
 
 
-def _read(path: Path) -> tuple[WeightsHeader, dict[str, Tensor], str]:
+class _File(NamedTuple):
+    header: WeightsHeader
+    tensors: dict[str, Tensor]
+    digest: str
+
+
+def _read(path: Path) -> _File:
     from safetensors import SafetensorError, safe_open  # noqa: PLC0415
 
     expected = "a .safetensors file with weights of panoscene"
@@ -209,7 +260,8 @@ def _read(path: Path) -> tuple[WeightsHeader, dict[str, Tensor], str]:
         if version != SCHEMA:
             found = f"a header of schema {version}"
             raise CheckpointError(path, found, f"schema {SCHEMA}: another version wrote this file")
-        return WeightsHeader.model_validate(document), tensors, metadata.get(_HASH, "")
+        header = WeightsHeader.model_validate(document)
+        return _File(header, tensors, metadata.get(_HASH, ""))
     except (ValidationError, json.JSONDecodeError) as error:
         raise CheckpointError(path, " ".join(str(error).split())[:200], expected) from None
 

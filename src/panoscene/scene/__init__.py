@@ -1,5 +1,7 @@
 """The vocabulary: records, categories, relations, and the files that carry them."""
 
+from panoscene._photo import PanoramaError as PanoramaError
+
 from ._atomic import write_atomically as write_atomically
 from ._boxes_table import objects_from_boxes as objects_from_boxes
 from ._boxes_table import read_box_table as read_box_table
@@ -18,7 +20,6 @@ from ._categories import category_index as category_index
 from ._categories import category_suggestion as category_suggestion
 from ._convert import scene_from_json as scene_from_json
 from ._convert import scene_to_json as scene_to_json
-from ._errors import PanoramaError as PanoramaError
 from ._errors import Problem as Problem
 from ._errors import SceneFormatError as SceneFormatError
 from ._files import read_scene as read_scene

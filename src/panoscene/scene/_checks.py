@@ -7,6 +7,7 @@ from typing import Any, cast
 import torch
 from pydantic import ValidationError
 
+from panoscene._photo import ASPECT_TOLERANCE
 from panoscene.geometry import polygon_problem
 
 from ._categories import category_suggestion
@@ -22,9 +23,6 @@ from ._schema import (
     SceneModel,
 )
 from ._triples import ROOM_PARTS, wall_names
-
-ASPECT_TOLERANCE = 0.01
-"""Relative deviation from 2:1 that a panorama may have."""
 
 _RADIANS = {"yaw", "lon", "lat"}
 _FIELDS = sorted(

@@ -5,8 +5,6 @@ from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from typing import cast
 
-from panoscene._file_error import FileError
-
 MAX_LISTED = 10
 """How many problems an error message lists before it only counts the rest."""
 
@@ -47,15 +45,6 @@ class SceneFormatError(ValueError):
     def __reduce__(self) -> tuple[type, tuple[str, tuple[Problem, ...]]]:
         """Let worker processes hand the error on."""
         return type(self), (self.file, self.problems)
-
-
-class PanoramaError(FileError):
-    """A picture cannot be used as an equirectangular panorama.
-
-    Attributes:
-        file: Name of the picture.
-        reason: What was found and what was expected.
-    """
 
 
 def shown(value: object, length: int = 60) -> str:

@@ -62,8 +62,10 @@ class Lens:
             return direction_from_pixel(uv, self.rows, self.columns).numpy()
         pixel = 2 * self.reach / self.columns
         x, z = (u - self.columns / 2) * pixel, (self.rows / 2 - v) * pixel
-        view = np.stack([x, np.ones_like(x), z], axis=-1) / np.sqrt(1 + x * x + z * z)[..., None]
-        return view @ self.world_from_view.T.astype(view.dtype)
+        part = 1 / np.sqrt(1 + x * x + z * z)
+        # faster than a product of matrices as thin as these
+        rows = self.world_from_view.astype(x.dtype)
+        return np.stack([(right * x + ahead + up * z) * part for right, ahead, up in rows], axis=-1)
 
     def pixels(
         self, points: Float[np.ndarray, "*points 3"]

@@ -2,10 +2,8 @@
 
 import numpy as np
 from jaxtyping import Float, Int32, Int64
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from panoscene.geometry import edge_neighbours
+from panoscene.geometry import connected_components, edge_neighbours
 from panoscene.views._rays import Soup
 
 _CREASE = np.radians(35.0)
@@ -21,9 +19,7 @@ def facets(soup: Soup) -> Int32[np.ndarray, " faces"]:
     count = len(soup.faces)
     one, two = edge_neighbours(soup.faces)
     flat = _cosine(soup.normal, one, two) > np.cos(_CREASE)
-    one, two = one[flat], two[flat]
-    graph = coo_array((np.ones(len(one), bool), (one, two)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
+    return connected_components(count, one[flat], two[flat]).astype(np.int32)
 
 
 def _cosine(

@@ -5,8 +5,7 @@ import pytest
 import torch
 import trimesh
 
-from panoscene.models.shape import _fewer
-from panoscene.models.shape._fewer import _gathered, _parted, _unfolded, fewer_faces, is_closed
+from panoscene.models.shape._fewer import _parted, fewer_faces, is_closed, simplified, unfolded
 from panoscene.scene import Mesh, box_mesh
 
 
@@ -32,15 +31,13 @@ def test_meshes_with_few_triangles_stay_as_they_are() -> None:
     assert fewer_faces(mesh, 12) is mesh
 
 
-def test_gathering_alone_may_be_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.5)
-    mesh = Mesh(torch.tensor(ball.vertices).float(), torch.tensor(ball.faces))
+def test_few_triangles_are_only_mended() -> None:
     few = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
-    gathered = few.vertices, few.faces.astype(np.int64)
-    monkeypatch.setattr(_fewer, "_gathered", lambda *_: gathered)
-    found = fewer_faces(mesh, 400)
-    assert len(found.faces) == len(few.faces) < 400
-    assert as_trimesh(found).is_watertight
+    found = simplified(few.vertices, few.faces.astype(np.int64), 400)
+    assert found is not None
+    assert found[0] == pytest.approx(few.vertices)
+    assert np.array_equal(found[1], few.faces)
+    assert simplified(few.vertices, few.faces[1:].astype(np.int64), 400) is None
 
 
 def test_what_is_not_closed_stays_as_it_is() -> None:
@@ -66,23 +63,13 @@ def test_sheets_that_touch_in_an_edge_are_parted() -> None:
 
 def test_triangles_back_to_back_go() -> None:
     faces = np.array([[0, 1, 2], [3, 4, 5], [2, 1, 0]])
-    assert _unfolded(faces).tolist() == [[3, 4, 5]]
+    assert unfolded(faces).tolist() == [[3, 4, 5]]
 
 
 def test_of_three_triangles_on_one_another_one_is_left() -> None:
     faces = np.array([[0, 1, 2], [3, 4, 5], [2, 1, 0], [1, 2, 0]])
-    found = _unfolded(faces)
+    found = unfolded(faces)
     assert len(found) == 2
     assert [3, 4, 5] in found.tolist()
     first = next(face for face in found.tolist() if 0 in face)
     assert first in ([0, 1, 2], [1, 2, 0])
-
-
-def test_flat_places_are_gathered_and_stay_closed() -> None:
-    box = trimesh.creation.box((1, 1, 1))
-    for _ in range(5):
-        box = box.subdivide()
-    points, faces = _gathered(box.vertices, box.faces.astype(np.int64), 500)
-    assert len(faces) < len(box.faces) / 2
-    assert is_closed(faces)
-    assert trimesh.Trimesh(points, faces, process=False).volume == pytest.approx(1, rel=0.02)

@@ -68,8 +68,8 @@ def test_divided_blocks_are_those_of_the_fine_grid() -> None:
     fine, coarse = ball(32, 0.6), ball(16, 0.6)
     unknown = torch.full((16, 16, 16), torch.inf)
 
-    def exact(node: Int64[Tensor, "n 3"]) -> Tensor:
-        return fine[node.unbind(1)]
+    def exact(number: Int64[Tensor, " n"]) -> Tensor:
+        return fine.flatten()[number]
 
     blocks = finer_blocks(first_blocks(coarse, unknown), exact)
     vertices, faces = march(blocks.values, blocks.cases, blocks.place, 8)
@@ -78,7 +78,7 @@ def test_divided_blocks_are_those_of_the_fine_grid() -> None:
     assert trimesh.Trimesh(vertices, faces).volume == pytest.approx(whole.volume, rel=1e-4)
     # parabolas know the ball well enough: nothing is asked for
     known = torch.zeros(16, 16, 16)
-    guessed = finer_blocks(first_blocks(coarse, known), lambda node: node[:, 0] * torch.nan)
+    guessed = finer_blocks(first_blocks(coarse, known), lambda number: number * torch.nan)
     vertices, faces = march(guessed.values, guessed.cases, guessed.place, 8)
     assert is_closed(faces.numpy())
     assert trimesh.Trimesh(vertices, faces).volume == pytest.approx(whole.volume, rel=0.01)
@@ -90,6 +90,6 @@ def test_what_only_fine_nodes_see_stays_closed() -> None:
     unknown = torch.full((16, 16, 16), torch.inf)
     blocks = first_blocks(coarse, unknown)
     for _ in range(2):
-        blocks = finer_blocks(blocks, lambda node: noise[(node % 33).unbind(1)])
+        blocks = finer_blocks(blocks, lambda number: noise.flatten()[number % noise.numel()])
     _, faces = march(blocks.values, blocks.cases, blocks.place, 16)
     assert is_closed(faces.numpy())

@@ -2,12 +2,13 @@ import math
 
 import numpy as np
 import pytest
+import scipy.ndimage
 import torch
 from torch import Tensor
 
 from panoscene.geometry import panorama_directions
 from panoscene.models.upright._directions import find_directions
-from panoscene.models.upright._edges import edge_points
+from panoscene.models.upright._edges import _correlated, edge_points
 from panoscene.models.upright._segments import find_segments
 
 
@@ -67,3 +68,11 @@ def test_edge_points_lie_within_their_pixels_and_views() -> None:
     assert np.abs(place[:, 1] - points.row - 0.5).max() <= 0.5 + 1e-4
     frames = points.camera_from_view
     assert np.linalg.det(frames) == pytest.approx(np.ones(len(frames)), abs=1e-5)
+
+
+@pytest.mark.parametrize("weights", [[0.1, 0.5, 0.8, 0.5, 0.1], [-0.3, -0.2, 0.0, 0.2, 0.3]])
+def test_correlations_are_scipys_to_the_bit(weights: list[float]) -> None:
+    view = np.random.default_rng(0).random((40, 50), dtype=np.float32)
+    for axis in (0, 1):
+        expected = scipy.ndimage.correlate1d(view, weights, axis=axis)
+        assert np.array_equal(_correlated(view, np.array(weights), axis), expected)

@@ -141,6 +141,26 @@ def test_one_seed_gives_one_picture(lit: LitScene, day):
     assert not np.array_equal(other.radiance, day.radiance)
 
 
+def test_a_second_light_that_shares_the_scene_gives_the_same_picture(
+    renderer: Renderer, scene: RenderScene, lit: LitScene
+):
+    night = sample_light(np.random.default_rng(5), scene, "night")
+    alone = renderer.light_up(scene, night, outside_width=128)
+    shared = renderer.light_up(scene, night, outside_width=128, like=lit)
+    camera = Camera((2.5, 2.0, 1.6), 0.3, width=64, height=32)
+    one, two = (place.photograph(camera, 3, samples=2, depth=3) for place in (alone, shared))
+    assert np.array_equal(one.rgb, two.rgb)
+    assert np.array_equal(one.distance, two.distance)
+
+
+def test_a_light_is_shared_within_one_scene_only(
+    renderer: Renderer, scene: RenderScene, lit: LitScene
+):
+    light = sample_light(np.random.default_rng(5), scene, "night")
+    with pytest.raises(ValueError, match="another scene"):
+        renderer.light_up(dataclasses.replace(scene), light, outside_width=128, like=lit)
+
+
 def test_the_largest_seed_is_one(lit: LitScene):
     """Seeds of recipes fill 32 bits."""
     tiny = dataclasses.replace(CAMERA, width=32, height=16)

@@ -5,7 +5,7 @@ from pathlib import Path
 import torch
 
 from panoscene.models._editions import Edition
-from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Objects, Relations
 
 from ._config import CONFIGS
@@ -72,6 +72,5 @@ def load_context_stage(
         CheckpointError: There are no weights, or they are for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    network = build_context(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
-    read_weights(path, network, stage=STAGE, edition=edition)
+    network = load_network(path, build_context, CONFIGS[edition], stage=STAGE, edition=edition)
     return ContextStage(network.to(device))

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import torch
 import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -98,25 +97,14 @@ def fold_norms(backbone: Backbone) -> None:
 
 
 def _convolutions_before_norms(backbone: Backbone) -> dict[str, nn.Conv2d]:
-    made: list[tuple[Tensor, nn.Conv2d]] = []
+    """Return the convolution before each normalisation: all backbones list them so."""
     pairs: dict[str, nn.Conv2d] = {}
-    hooks = []
+    last: nn.Conv2d | None = None
     for name, module in backbone.named_modules():
         if isinstance(module, nn.Conv2d):
-            hooks.append(
-                module.register_forward_hook(lambda conv, _, out: made.append((out, conv)))
-            )
+            last = module
         elif isinstance(module, nn.BatchNorm2d):
-
-            def note(_: nn.Module, given: tuple[Tensor, ...], name: str = name) -> None:
-                if made and made[-1][0] is given[0]:
-                    pairs[name] = made[-1][1]
-
-            hooks.append(module.register_forward_pre_hook(note))
-    training = backbone.training
-    with torch.no_grad():
-        backbone.eval()(torch.zeros(1, 3, 64, 64, device=backbone.mean.device))
-    backbone.train(training)
-    for hook in hooks:
-        hook.remove()
+            if last is not None and last.out_channels == module.num_features:
+                pairs[name] = last
+            last = None
     return pairs

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from panoscene.models._editions import Edition
-from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Detections
 
 from ._config import CONFIGS, DetectorConfig
@@ -105,8 +105,7 @@ def load_detector_stage(
         CheckpointError: The file is missing or for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    network = build_detector(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
-    read_weights(path, network, stage=STAGE, edition=edition)
+    network = load_network(path, build_detector, CONFIGS[edition], stage=STAGE, edition=edition)
     return DetectorStage(
         network.to(device), score_threshold=score_threshold, mask_height=mask_height
     )

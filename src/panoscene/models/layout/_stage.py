@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.models._editions import Edition
-from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.models._weights import load_network, weights_file
 from panoscene.models.layout._config import CONFIGS
 from panoscene.models.layout._network import LayoutNetwork, build_layout
 from panoscene.models.layout._room import room_from_signals
@@ -119,8 +119,7 @@ def load_layout_stage(
         CheckpointError: There are no such weights, or they are for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    network = build_layout(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
-    read_weights(path, network, stage=STAGE, edition=edition)
+    network = load_network(path, build_layout, CONFIGS[edition], stage=STAGE, edition=edition)
     network.to(device)
     if device == "cpu":
         network.to(memory_format=torch.channels_last)

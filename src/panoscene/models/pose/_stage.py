@@ -9,7 +9,7 @@ from torch.nn import functional
 
 from panoscene.geometry import OrientedBoxes, decode_box_code, perspective_crop
 from panoscene.models._editions import Edition
-from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import CATEGORIES, Detections, Layout, Objects
 
 from ._clues import pose_clues
@@ -196,8 +196,7 @@ def load_pose_stage(
         CheckpointError: There are no weights, or they are for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    network = build_pose(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
-    read_weights(path, network, stage=STAGE, edition=edition)
+    network = load_network(path, build_pose, CONFIGS[edition], stage=STAGE, edition=edition)
     return PoseStage(network.to(device))
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int8, Int64, UInt8
 from torch import Tensor
 from torch.nn import functional as F
 
-from ._cubes import CELLS, at, cell_cases
+from ._cubes import ALL_INSIDE, CELLS, at, cell_cases, mixed, numbers_of
 
 TOLERANCE = 0.1
 """Error of parabolas that is let pass, in differences within a cell."""
@@ -19,10 +19,9 @@ GAIN = 4.0
 _LEAST = 1e-4
 """Value, or less it, of nodes that have to be outside or inside and are not."""
 _NODES = CELLS + 1
-_ALL_INSIDE = 255
 
-Evaluate = Callable[[Int64[Tensor, "n 3"]], Float[Tensor, " n"]]
-"""Exact values at nodes of the finer grid, which are counted from its corner."""
+Evaluate = Callable[[Int64[Tensor, " n"]], Float[Tensor, " n"]]
+"""Exact values at nodes of the finer grid, by their numbers in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +80,7 @@ def first_blocks(values: Float[Tensor, "n n n"], error: Float[Tensor, "c c c"]) 
     cases = cell_cases(wide < 0)
     sides = values.new_ones((count * CELLS + 2,) * 3, dtype=torch.int8)
     _mark(sides, place, cases)
-    some = _mixed(cases).any(1)
+    some = mixed(cases).any(1)
     return Blocks(wide[some], cases[some], error.flatten(3).flatten(0, 2)[some], place[some], sides)
 
 
@@ -94,10 +93,11 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
     Args:
         blocks: Of the coarser grid.
         evaluate: Gives exact values.
-        last: Whether nothing needs to be known of errors any more.
+        last: Whether nothing needs to be known of errors and sides any more: they are those of
+            the coarser grid.
     """
     tables = _tables(blocks.values.device)
-    block, part = _mixed(blocks.cases)[:, tables.cells].any(2).nonzero().unbind(1)
+    block, part = mixed(blocks.cases)[:, tables.cells].any(2).nonzero().unbind(1)
     values = at(blocks.values, 125 * block[:, None] + tables.parts.index_select(0, part))
     known = at(blocks.error, 64 * block[:, None] + tables.cells.index_select(0, part))
     place = 2 * blocks.place.index_select(0, block) + tables.steps.index_select(0, part)
@@ -122,11 +122,13 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
     found = torch.where(side > 0, found.clamp(min=_LEAST), found)
     found = torch.where(side < 0, found.clamp(max=-_LEAST), found)
     cases = cell_cases(found < 0)
-    sides = blocks.sides[1:-1, 1:-1, 1:-1]
-    for axis in range(3):
-        sides = sides.repeat_interleave(2, axis)
-    sides = F.pad(sides, (1,) * 6, value=1)
-    _mark(sides, place, cases)
+    sides = blocks.sides
+    if not last:
+        sides = sides[1:-1, 1:-1, 1:-1]
+        for axis in range(3):
+            sides = sides.repeat_interleave(2, axis)
+        sides = F.pad(sides, (1,) * 6, value=1)
+        _mark(sides, place, cases)
     return Blocks(found, cases, error, place, sides)
 
 
@@ -146,10 +148,8 @@ def _exact(
     wanted.index_fill_(0, grid.index[rough.to(grid.values) @ tables.fresh > 0], True)
     own = grid.index.index_select(1, tables.own)
     # block after block: points that come one after the other are close together
-    place = own[at(wanted, own)]
-    nodes = round(len(wanted) ** (1 / 3))
-    node = torch.stack((place // (nodes * nodes), place // nodes % nodes, place % nodes), 1)
-    grid.values.index_copy_(0, place, evaluate(node))
+    place = at(own, numbers_of(at(wanted, own)))
+    grid.values.index_copy_(0, place, evaluate(place))
     return at(grid.values, grid.index)
 
 
@@ -160,11 +160,6 @@ def _columns(
     return values.t().contiguous().index_select(0, chosen.flatten()).view(*chosen.shape, -1)
 
 
-def _mixed(cases: UInt8[Tensor, "blocks cells"]) -> Bool[Tensor, "blocks cells"]:
-    """Return in which cells the surface is."""
-    return (cases > 0) & (cases < _ALL_INSIDE)
-
-
 def _mark(
     sides: Int8[Tensor, "n n n"],
     place: Int64[Tensor, "blocks 3"],
@@ -173,7 +168,7 @@ def _mark(
     """Write the sides of all cells of some blocks."""
     ticks = torch.arange(1, CELLS + 1, device=place.device)
     index = _flat(CELLS * place, torch.cartesian_prod(ticks, ticks, ticks), len(sides))
-    side = (cases == 0).to(sides) - (cases == _ALL_INSIDE).to(sides)
+    side = (cases == 0).to(sides) - (cases == ALL_INSIDE).to(sides)
     sides.view(-1).index_copy_(0, index.flatten(), side.flatten())
 
 

@@ -4,20 +4,29 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise, product
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int, Int32, Int64, UInt8
 from torch import Tensor
 
 CELLS = 4
 """Of a block, along each axis: it has one node more."""
+ALL_INSIDE = 255
+"""Case of a cell of which all corners are inside; 0 is that of one of which none is."""
 _NODES = CELLS + 1
-_CORNERS = tuple(product((0, 1), repeat=3))
-_EDGES = tuple(
+CORNERS = tuple(product((0, 1), repeat=3))
+"""Of a cube."""
+EDGES = tuple(
     (one, other)
     for one, other in product(range(8), repeat=2)
     if one < other and (one ^ other) in (1, 2, 4)
 )
+"""Of a cube, from corner to corner."""
 _OWN = CELLS**3
+_EDGES = 3 * _OWN
+"""That a block owns."""
+_STEPS = (_NODES * _NODES, _NODES, 1)
+"""From a node to the next along each axis."""
 
 Triangle = tuple[int, int, int]
 
@@ -28,12 +37,12 @@ class _Tables:
 
     case: Float[Tensor, "125 64"]
     """Sums what is inside to the number of each cell's case."""
-    start: Int64[Tensor, " 192"]
-    end: Int64[Tensor, " 192"]
-    """Nodes of the edges that a block owns: 64 along each axis, none on its upper sides."""
-    place: Float[Tensor, "192 3"]
-    """Of the first node."""
-    across: Float[Tensor, "192 3"]
+    place: Float[Tensor, "125 3"]
+    """Of each node."""
+    owns: Bool[Tensor, " 125"]
+    """Nodes from which a block owns edges: those on no upper side."""
+    own: Int64[Tensor, " 125"]
+    """Their numbers."""
     owner: Int64[Tensor, "64 12"]
     """For each edge of each cell, which of the eight blocks from here on upwards owns it."""
     owned: Int32[Tensor, "64 12"]
@@ -48,6 +57,11 @@ class _Tables:
 def cell_cases(inside: Bool[Tensor, "blocks 125"]) -> UInt8[Tensor, "blocks 64"]:
     """Return the case of each cell of each block: a bit for each corner that is inside."""
     return (inside.float() @ _tables(inside.device).case).to(torch.uint8)
+
+
+def mixed(cases: UInt8[Tensor, "blocks cells"]) -> Bool[Tensor, "blocks cells"]:
+    """Return in which cells the surface is."""
+    return (cases > 0) & (cases < ALL_INSIDE)
 
 
 def march(
@@ -71,23 +85,15 @@ def march(
     Source: Lorensen and Cline 1987.
     """
     tables = _tables(values.device)
-    inside = values < 0
-    crossed = inside.index_select(1, tables.start) != inside.index_select(1, tables.end)
-    block, edge = crossed.nonzero().unbind(1)
-    first = block * values.shape[1]
-    one = at(values, first + at(tables.start, edge))
-    other = at(values, first + at(tables.end, edge))
-    share = (one / (one - other))[:, None]
-    vertices = (place * float(CELLS)).index_select(0, block)
-    vertices += tables.place.index_select(0, edge)
-    vertices.addcmul_(share, tables.across.index_select(0, edge))
-    number = torch.cumsum(crossed.flatten(), 0, dtype=torch.int32)
+    vertices, block, edge, _ = crossings(values, place)
+    number = torch.zeros(len(values) * _EDGES, dtype=torch.int64, device=place.device)
+    number[block * _EDGES + edge] = torch.arange(len(edge), device=place.device)
 
     index = place.new_zeros((count + 1,) * 3)
     index[place.unbind(1)] = torch.arange(len(place), device=place.device)
-    upper = place[:, None] + torch.tensor(_CORNERS, device=place.device)
-    owners = (index[upper.unbind(2)] * len(tables.start)).to(torch.int32)
-    cell = ((cases > 0) & (cases < 255)).flatten().nonzero()[:, 0]
+    upper = place[:, None] + torch.tensor(CORNERS, device=place.device)
+    owners = (index[upper.unbind(2)] * _EDGES).to(torch.int32)
+    cell = numbers_of(mixed(cases))
     case = at(cases, cell).long()
     block, cell = cell // _OWN, cell % _OWN
     owner = (block * 8)[:, None] + tables.owner.index_select(0, cell)
@@ -98,7 +104,40 @@ def march(
     skipped = at(tables.first, case) - (some.cumsum(0) - some)
     triangle = torch.arange(len(row), device=row.device) + at(skipped, row)
     corner = tables.triangles.index_select(0, triangle)
-    return vertices, at(edges, (row * len(_EDGES))[:, None] + corner).long() - 1
+    return vertices, at(edges, (row * len(EDGES))[:, None] + corner)
+
+
+def crossings(
+    values: Float[Tensor, "blocks 125"], place: Int64[Tensor, "blocks 3"]
+) -> tuple[
+    Float[Tensor, "edges 3"],
+    Int64[Tensor, " edges"],
+    Int64[Tensor, " edges"],
+    Bool[Tensor, " edges"],
+]:
+    """Return where edges are crossed, their blocks and numbers there, and which begin inside."""
+    tables = _tables(values.device)
+    inside = (values < 0).flatten()
+    found = []
+    for step in _STEPS:
+        crossed = torch.zeros_like(inside)
+        torch.ne(inside[:-step], inside[step:], out=crossed[:-step])
+        crossed.view(-1, _NODES**3).logical_and_(tables.owns)
+        found.append(numbers_of(crossed))
+    node = torch.cat(found)
+    block = node // _NODES**3
+    local = node - block * _NODES**3
+    one = at(values, node)
+    points = (place * float(CELLS)).index_select(0, block)
+    points += tables.place.index_select(0, local)
+    edge = at(tables.own, local)
+    last = 0
+    for axis, (step, some) in enumerate(zip(_STEPS, found, strict=True)):
+        mine = slice(last, last + len(some))
+        points[mine, axis] += one[mine] / (one[mine] - at(values, some + step))
+        edge[mine] += axis * _OWN
+        last += len(some)
+    return points, block, edge, one < 0
 
 
 def at(values: Tensor, index: Int[Tensor, "*batch"]) -> Tensor:
@@ -110,14 +149,12 @@ def at(values: Tensor, index: Int[Tensor, "*batch"]) -> Tensor:
 def _tables(device: torch.device) -> _Tables:
     nodes = torch.cartesian_prod(*(torch.arange(_NODES),) * 3)
     cells = torch.cartesian_prod(*(torch.arange(CELLS),) * 3)
-    corners = torch.tensor(_CORNERS)
+    corners = torch.tensor(CORNERS)
     node = _node(cells[:, None] + corners)
     case = torch.zeros(len(nodes), len(cells))
     case[node, torch.arange(len(cells))[:, None]] = 2.0 ** torch.arange(8)
-    axes = torch.eye(3, dtype=torch.int64)
-    first = cells.repeat(3, 1)
-    across = axes.repeat_interleave(_OWN, 0)
-    ends = torch.tensor(_EDGES)
+    owns = (nodes < CELLS).all(1)
+    ends = torch.tensor(EDGES)
     low = cells[:, None] + corners[ends[:, 0]]
     axis = (corners[ends[:, 1]] - corners[ends[:, 0]]).argmax(1)
     behind = low // CELLS
@@ -126,10 +163,9 @@ def _tables(device: torch.device) -> _Tables:
     count = torch.tensor([len(found) for found in triangles])
     found = _Tables(
         case=case,
-        start=_node(first),
-        end=_node(first + across),
-        place=first.float(),
-        across=across.float(),
+        place=nodes.float(),
+        owns=owns,
+        own=owns.cumsum(0) - 1,
         owner=(behind * torch.tensor([4, 2, 1])).sum(-1),
         owned=(axis * _OWN + (low % CELLS * steps).sum(-1)).int(),
         first=count.cumsum(0) - count,
@@ -147,7 +183,8 @@ def _node(place: Int64[Tensor, "*batch 3"]) -> Int64[Tensor, "*batch"]:
 def case_triangles() -> tuple[tuple[Triangle, ...], ...]:
     """Return the triangles of each of the 256 cases, as edges of the cube on which they stand."""
     return tuple(
-        tuple(triangle for loop in _loops(case) for triangle in _cut(loop)) for case in range(256)
+        tuple(triangle for loop in case_loops(case) for triangle in _cut(loop))
+        for case in range(256)
     )
 
 
@@ -160,17 +197,17 @@ def _sides() -> tuple[tuple[int, ...], ...]:
         for one, other in ((0, 0), (1, 0), (1, 1), (0, 1)):
             place = [0, 0, 0]
             place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3] = end, one, other
-            ring.append(_CORNERS.index((place[0], place[1], place[2])))
+            ring.append(CORNERS.index((place[0], place[1], place[2])))
         found.append(tuple(ring if end else reversed(ring)))
     return tuple(found)
 
 
-def _loops(case: int) -> list[list[int]]:
+def case_loops(case: int) -> list[list[int]]:
     """Return the rings of crossed edges around what is inside, counter-clockwise from outside."""
     following: dict[int, int] = {}
     for side in _sides():
         steps = [
-            (_EDGES.index((min(pair), max(pair))), case >> pair[1] & 1)
+            (EDGES.index((min(pair), max(pair))), case >> pair[1] & 1)
             for pair in pairwise((*side, side[0]))
             if (case >> pair[0] & 1) != (case >> pair[1] & 1)
         ]
@@ -204,5 +241,12 @@ def _cut(ring: list[int]) -> list[Triangle]:
 
 
 def _in_one_side(one: int, other: int) -> bool:
-    corners = {*_EDGES[one], *_EDGES[other]}
+    corners = {*EDGES[one], *EDGES[other]}
     return any(corners <= set(side) for side in _sides())
+
+
+def numbers_of(chosen: Bool[Tensor, "*batch"]) -> Int64[Tensor, " n"]:
+    """Return the numbers of what is true; in memory of the processor NumPy is quicker."""
+    if chosen.device.type == "cpu":
+        return torch.from_numpy(np.flatnonzero(chosen.numpy()))
+    return chosen.flatten().nonzero()[:, 0]

@@ -1,7 +1,8 @@
 """Surfaces of fields: marching cubes on grids that are fine only near the surface."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import torch
@@ -12,12 +13,13 @@ from torch.nn import functional as F
 
 from panoscene.scene import Mesh
 
-from ._blocks import GAIN, finer_blocks, first_blocks
+from ._blocks import GAIN, Blocks, finer_blocks, first_blocks
 from ._config import ISO_LEVEL, ShapeConfig
-from ._cubes import CELLS, march
+from ._cubes import CELLS, at, march, mixed, numbers_of
 from ._fast_field import FastField, fast_field
-from ._fewer import fewer_faces
+from ._fewer import fewer_faces, simplified
 from ._network import ShapeNetwork
+from ._quads import gathered_surface
 
 COARSEST = 16
 """Cells along each axis of the grid that is evaluated everywhere."""
@@ -54,8 +56,8 @@ def extract_meshes(
         network: In evaluation mode.
         code: Of the shapes.
         resolution: Cells along each axis: 32, 64, 128 or 256.
-        most: Triangles that a mesh may have; those where it is flat are joined, and vertices have
-            four decimals. None keeps all.
+        most: Triangles that a mesh may have. Where it is flat cells have vertices in common, then
+            edges are collapsed; vertices have four decimals. None keeps all.
 
     Returns:
         Closed meshes, faces counter-clockwise from outside; None where nothing is inside.
@@ -72,11 +74,7 @@ def extract_meshes(
 
     @torch.inference_mode()
     def surface(index: int) -> Mesh | None:
-        mesh = _surface(_Shape(field, index, config.reach), config, resolution)
-        if mesh is None or most is None:
-            return mesh
-        fewer = fewer_faces(mesh, most)
-        return replace(fewer, vertices=fewer.vertices.round(decimals=_DECIMALS))
+        return _surface(_Shape(field, index, config.reach), config, resolution, most)
 
     threads = torch.get_num_threads()
     if len(code) == 1 or threads == 1:
@@ -109,32 +107,42 @@ class _Shape:
         like = self.field.polynomial
         return torch.linspace(-self.reach, self.reach, nodes, dtype=like.dtype, device=like.device)
 
-    def at(self, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
-        return self.field(self.index, points)
+    def everywhere(self) -> Float[Tensor, "m m m"]:
+        """Return the field on 32 cells along each axis, on parabolas through those of 16."""
+        order = _by_place(COARSEST + 1, self.field.polynomial.device)
+        values = self.field.polynomial.new_empty(len(order))
+        values[order] = self.on(COARSEST, order)
+        return _between(values.reshape((COARSEST + 1,) * 3))
 
-    def everywhere(self) -> _Grid:
-        """Return the field on 32 cells along each axis, exact where the surface may be."""
-        axis = self.axis(COARSEST + 1)
-        values = self.at(torch.cartesian_prod(axis, axis, axis))
-        values = values.reshape(COARSEST + 1, COARSEST + 1, COARSEST + 1)
-        least, most = _extremes(values)
+    def on(self, cells: int, number: Int64[Tensor, " n"]) -> Float[Tensor, " n"]:
+        """Return the field at some nodes of a grid."""
+        nodes = cells + 1
+        ticks = torch.stack((number // (nodes * nodes), number // nodes % nodes, number % nodes), 1)
+        return self.field(self.index, at(self.axis(nodes), ticks))
+
+    def near(self, guess: Float[Tensor, "m m m"], levels: tuple[float, ...]) -> _Grid:
+        """Return the grid with exact values where the surfaces of rising levels may be."""
+        least, most = _extremes(guess[::2, ::2, ::2])
         margin = _MARGIN * (most - least)
-        near = (least - margin < _LEVELS[0]) & (most + margin > _LEVELS[-1])
-        guess = _between(values)
+        cells = (least - margin < levels[-1]) & (most + margin > levels[0])
         nodes = len(guess)
-        wanted = _nodes_of(near, nodes)
+        wanted = _nodes_of(cells, nodes)
         wanted[::2, ::2, ::2] = False
-        axis = self.axis(nodes)
-        place = wanted.nonzero()
-        finer = guess.clone()
-        finer[wanted] = self.at(axis[place])
-        error = torch.where(near, _most_of((guess - finer).abs_()) / GAIN, torch.inf)
+        order = _by_place(nodes, guess.device)
+        place = at(order, numbers_of(at(wanted, order)))
+        finer = guess.flatten().index_copy(0, place, self.on(nodes - 1, place)).view_as(guess)
+        error = torch.where(cells, _most_of((guess - finer).abs_()) / GAIN, torch.inf)
         return _Grid(finer, _each_twice(error))
 
 
-def _surface(shape: _Shape, config: ShapeConfig, resolution: int) -> Mesh | None:
-    grid = shape.everywhere()
+def _surface(shape: _Shape, config: ShapeConfig, resolution: int, most: int | None) -> Mesh | None:
+    guess = shape.everywhere()
+    grid = shape.near(guess, _LEVELS[:1])
     level, fitted = _level(grid.values, config)
+    if not fitted:
+        # the choice of another level needs exact values around all of them
+        grid = shape.near(guess, _LEVELS)
+        level, fitted = _level(grid.values, config)
     values = _solid(grid.values, level)
     moved = _most_of((values != grid.values - level).to(values))
     blocks = first_blocks(values, torch.where(_each_twice(moved) > 0, torch.inf, grid.error))
@@ -143,18 +151,42 @@ def _surface(shape: _Shape, config: ShapeConfig, resolution: int) -> Mesh | None
     cells = len(grid.error)
     while cells < resolution:
         cells *= 2
-        axis = shape.axis(cells + 1)
 
-        def exact(node: Int64[Tensor, "n 3"], axis: Float[Tensor, " m"] = axis) -> Tensor:
-            return shape.at(axis[node]) - level
+        def exact(number: Int64[Tensor, " n"], cells: int = cells) -> Tensor:
+            return shape.on(cells, number) - level
 
         blocks = finer_blocks(blocks, exact, last=cells == resolution)
-    vertices, faces = march(blocks.values, blocks.cases, blocks.place, cells // CELLS)
-    vertices = vertices.cpu() * (2 * config.reach / cells) - config.reach
+    mesh = _mesh(blocks, cells // CELLS, most)
+    vertices = mesh.vertices * (2 * config.reach / cells) - config.reach
     if fitted:
         first, last = vertices.amin(0), vertices.amax(0)
         vertices = (vertices - (first + last) / 2) / (last - first)
-    return Mesh(vertices.clamp(-0.5, 0.5), faces.cpu())
+    vertices = vertices.clamp(-0.5, 0.5)
+    return Mesh(vertices if most is None else vertices.round(decimals=_DECIMALS), mesh.faces)
+
+
+def _mesh(blocks: Blocks, count: int, most: int | None) -> Mesh:
+    """Return the surface with about that many triangles; vertices in cells from the corner."""
+    parts = blocks.values, blocks.cases, blocks.place, count
+    # of marching cubes, a cell has two triangles
+    if most is not None and int(mixed(blocks.cases).sum()) > most / 2:
+        found = simplified(*gathered_surface(*parts, least=most), most)
+        if found is not None:
+            return Mesh(torch.from_numpy(found[0]).float(), torch.from_numpy(found[1]))
+    vertices, faces = march(*parts)
+    mesh = Mesh(vertices.cpu(), faces.cpu())
+    return mesh if most is None else fewer_faces(mesh, most)
+
+
+@cache
+def _by_place(nodes: int, device: torch.device) -> Int64[Tensor, " n"]:
+    """Return the nodes of a grid so that those behind one another are close (Morton 1966)."""
+    ticks = torch.arange(nodes, device=device)
+    spread = torch.stack([(ticks >> bit & 1) << 3 * bit for bit in range(nodes.bit_length())]).sum(
+        0
+    )
+    x, y, z = torch.cartesian_prod(spread, spread, spread).unbind(1)
+    return (x << 2 | y << 1 | z).argsort()
 
 
 def _between(values: Float[Tensor, "n n n"]) -> Float[Tensor, "m m m"]:

@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 from torch.nn import functional as F
 
+from ._cubes import numbers_of
 from ._elements import Elements
 from ._network import ShapeNetwork
 
@@ -17,7 +18,6 @@ _GROUP = 32
 _ROWS, _BLOCKS = 8, 32
 """Groups of one element in a block, and blocks worked on together: as the cache of a core holds."""
 _POINTS = 65_536
-_SPAN, _BITS = 1.4, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +31,14 @@ class FastField:
 
     polynomial: Float[Tensor, "shapes elements 10"]
     """Exponents plus the logarithm of the constant: above 0 where an element matters."""
-    enter: Float[Tensor, "shapes elements width_and_3 10"]
-    """From a point to the first layer, 1, the linear part of the result, and the exponent."""
+    enter: Float[Tensor, "shapes elements width_and_4 10"]
+    """From a point to the first layer, 1, the linear part of the result, the same with the other
+    sign, and half the squared distance from the Gaussian's centre."""
     middle: Float[Tensor, "shapes elements width width_and_1"]
     leave: Float[Tensor, "shapes elements 1 width"]
     """Weights of the middle layer in the result."""
+    loud: Float[Tensor, "shapes elements"]
+    """Values at the centres."""
 
     def __call__(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
         """Return the field of one shape.
@@ -44,13 +47,9 @@ class FastField:
             shape: Number of the shape.
             points: In the network's frame; the closer those behind one another, the better.
         """
-        found = points.new_zeros(len(points))
         if len(points) == 0:
-            return found
-        order = _by_place(points)
-        for place in order.split(_POINTS):
-            found[place] = self._together(shape, points.index_select(0, place))
-        return found
+            return points.new_zeros(0)
+        return torch.cat([self._together(shape, some) for some in points.split(_POINTS)])
 
     def _together(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
         """Return the field of one shape: elements that matter to a group are added to all of it."""
@@ -60,15 +59,18 @@ class FastField:
         found = terms.new_zeros(terms.shape[1:])
         element, group = _in_blocks(most[:, :-1] > 0)
         width = self.middle.shape[-2]
-        parts = (self.enter[shape], self.middle[shape], self.leave[shape])
+        parts = (self.enter[shape], self.middle[shape], self.leave[shape], self.loud[shape])
         for number, near in zip(element.split(_BLOCKS), group.split(_BLOCKS * _ROWS), strict=True):
-            enter, middle, leave = (part.index_select(0, number) for part in parts)
+            enter, middle, leave, loud = (part.index_select(0, number) for part in parts)
             place = terms.index_select(1, near).view(10, len(number), _ROWS * _GROUP)
-            first = enter @ place.transpose(0, 1)
-            second = (middle @ first[:, : width + 1].clamp_min(0)).clamp_min_(0)
-            value = (leave @ second).add_(first[:, width + 1 : width + 2])
-            value *= first[:, width + 2 :].exp_()
-            found.index_add_(0, near, value.view(-1, _GROUP), alpha=-NEGLIGIBLE)
+            # none of the rows may be below 0, so all are cut there in place
+            first = (enter @ place.transpose(0, 1)).clamp_min_(0)
+            second = (middle @ first[:, : width + 1]).clamp_min_(0)
+            value = (leave @ second)[:, 0]
+            value += first[:, width + 1]
+            value -= first[:, width + 2]
+            value *= first[:, width + 3].neg().exp_().mul_(loud[:, None])
+            found.index_add_(0, near, value.view(-1, _GROUP))
         return found.flatten()[: len(points)]
 
 
@@ -76,14 +78,16 @@ def _in_blocks(
     active: Bool[Tensor, "elements groups"],
 ) -> tuple[Int64[Tensor, " blocks"], Int64[Tensor, " rows"]]:
     """Return the element of each block, and its groups: as many in all, a spare one fills up."""
-    element, group = active.nonzero().unbind(1)
-    count = active.sum(1)
+    number = numbers_of(active)
+    element = number // active.shape[1]
+    group = number - element * active.shape[1]
+    count = torch.bincount(element, minlength=len(active))
     blocks = (count + _ROWS - 1) // _ROWS
     skipped = (blocks.cumsum(0) - blocks) * _ROWS - (count.cumsum(0) - count)
-    row = torch.arange(len(group), device=group.device) + skipped[element]
-    rows = group.new_full((int(blocks.sum()) * _ROWS,), active.shape[1])
-    rows[row] = group
-    return torch.arange(len(count), device=group.device).repeat_interleave(blocks), rows
+    row = torch.arange(len(group), device=group.device) + skipped.index_select(0, element)
+    number = torch.arange(len(count), device=group.device).repeat_interleave(blocks)
+    rows = group.new_full((len(number) * _ROWS,), active.shape[1])
+    return number, rows.index_copy_(0, row, group)
 
 
 def _terms(points: Float[Tensor, "n 3"], more: int) -> Float[Tensor, "10 n_and_more"]:
@@ -97,16 +101,6 @@ def _terms(points: Float[Tensor, "n 3"], more: int) -> Float[Tensor, "10 n_and_m
     torch.mul(place[:1], place[1:], out=found[3:5])
     torch.mul(place[1], place[2], out=found[5])
     return found
-
-
-def _by_place(points: Float[Tensor, "n 3"]) -> Int64[Tensor, " n"]:
-    """Return an order of points in which neighbours are close together (Morton 1966)."""
-    count = 2**_BITS
-    cell = ((points / _SPAN + 0.5) * count).clamp_(0, count - 1).long()
-    ticks = torch.arange(count, device=points.device)
-    spread = torch.stack([((ticks >> bit) & 1) << (3 * bit) for bit in range(_BITS)]).sum(0)
-    x, y, z = spread[cell].to(torch.int16).unbind(-1)
-    return ((x << 2) | (y << 1) | z).argsort(stable=True)
 
 
 def fast_field(network: ShapeNetwork, elements: Elements) -> FastField:
@@ -145,12 +139,15 @@ def fast_field(network: ShapeNetwork, elements: Elements) -> FastField:
     straight[..., -1] += decoder.leave.bias + 1
     one = torch.zeros_like(straight)
     one[..., -1] = 1
-    enter = F.pad(torch.cat((first, one, straight), -2), (6, 0))
+    enter = F.pad(torch.cat((first, one, straight, -straight), -2), (6, 0))
+    away = -polynomial
+    away[..., -1] += limit / 2
     middle = decoder.inner.weight * g2[..., :, None]
     bias = b2 + g2 * decoder.inner.bias
     return FastField(
         polynomial=polynomial,
-        enter=torch.cat((enter, polynomial[..., None, :]), -2),
+        enter=torch.cat((enter, away[..., None, :]), -2),
         middle=torch.cat((middle, bias[..., None]), -1),
         leave=(weight @ decoder.outer.weight)[..., None, :],
+        loud=elements.constant.clamp(max=-1e-12),
     )

@@ -13,12 +13,6 @@ FACES_PER_CELL = 32
 """Triangles that a mesh may have for each cell along an axis: 2,048 at resolution 64."""
 _BOLDNESS = 5.0
 """Of the library, from 0 to 10: the lower, the longer it takes, and the more triangles are left."""
-_CUBE = 0.7
-"""Edge of the cubes in which points are gathered; 1 is that of squares as large as the triangles
-that are left."""
-_FLAT = 0.9
-"""Share of the area of a surface that remains when it is seen from where most remains."""
-_ATTEMPTS = 10
 _MOST_TOUCHING = 200
 """Edges with more than two triangles that are mended."""
 _ONE_AT_A_TIME = Lock()
@@ -41,63 +35,30 @@ def fewer_faces(mesh: Mesh, most: int) -> Mesh:
     """
     if len(mesh.faces) <= most:
         return mesh
-    before = mesh.vertices.double().numpy(force=True)
-    faces = mesh.faces.long().numpy(force=True)
-    some, few = _gathered(before, faces, most)
-    if len(few) > most:
-        with _ONE_AT_A_TIME:
-            simplified = fast_simplification.simplify(
-                some, few.astype(np.int32), target_count=most, agg=_BOLDNESS
-            )
-        some, few = simplified[0], simplified[1]
-    points = _fitted(np.asarray(some, np.float64), before)
-    points, left = _parted(points, _unfolded(few))
-    if len(left) == 0 or not is_closed(left):
+    points = mesh.vertices.double().numpy(force=True)
+    found = simplified(points, mesh.faces.long().numpy(force=True), most)
+    if found is None:
         return mesh
-    return Mesh(torch.from_numpy(points).to(mesh.vertices), torch.from_numpy(left).to(mesh.faces))
+    points, faces = (torch.from_numpy(part) for part in found)
+    return Mesh(points.to(mesh.vertices), faces.to(mesh.faces))
 
 
-def _gathered(points: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
-    """Return a surface with one point for each small cube in which it is all but flat.
+def simplified(points: Points, faces: Faces, most: int) -> tuple[Points, Faces] | None:
+    """Return points and triangles of such a mesh, None if they cannot be closed.
 
-    That is much quicker than to collapse edges, and leaves fewer of them to collapse. Points in
-    cubes where the surface bends, or where gathering them makes sheets touch, stay as they are.
+    Args:
+        points: Corners.
+        faces: At each edge as many on one side as on the other.
+        most: triangles.
     """
-    normal, area = _normals(points, faces)
-    edge = _CUBE * float(np.sqrt(area.sum() / most))
-    number = ((points - points.min(axis=0)) / edge).astype(np.int64)
-    across = number.max(axis=0) + 1
-    cube = (number[:, 0] * across[1] + number[:, 1]) * across[2] + number[:, 2]
-    owner = cube[faces[:, 0]]
-    count = int(across.prod())
-    total = np.stack([np.bincount(owner, part, count) for part in normal])
-    flat = np.sqrt((total**2).sum(axis=0)) > _FLAT * np.bincount(owner, area, count)
-    place, few = np.arange(len(points)), faces
-    for _ in range(_ATTEMPTS):
-        place = np.where(flat[cube], cube, count + np.arange(len(points)))
-        few = place.take(faces)
-        kept = (few[:, 0] != few[:, 1]) & (few[:, 1] != few[:, 2]) & (few[:, 2] != few[:, 0])
-        few = _unfolded(few[kept])
-        touching = _in_touching_edges(few)
-        touching = touching[touching < count]
-        if len(touching) == 0:
-            break
-        flat[touching] = False
-    size = np.bincount(place)
-    mean = np.stack([np.bincount(place, part) for part in points.T], axis=1)
-    used = np.zeros(len(size), bool)
-    used[few] = True
-    return mean[used] / size[used, None], (np.cumsum(used) - 1).take(few)
-
-
-def _normals(
-    points: Points, faces: Faces
-) -> tuple[Float[np.ndarray, "3 faces"], Float[np.ndarray, " faces"]]:
-    """Return normals, as long as twice the areas, and these lengths."""
-    corners = np.ascontiguousarray(points.T).take(np.ascontiguousarray(faces.T), axis=1)
-    (x, y, z), (u, v, w) = (corners[:, k] - corners[:, 0] for k in (1, 2))
-    normal = np.stack((y * w - z * v, z * u - x * w, x * v - y * u))
-    return normal, np.sqrt((normal**2).sum(axis=0))
+    some, few = points, faces
+    if len(faces) > most:
+        with _ONE_AT_A_TIME:
+            some, few, *_ = fast_simplification.simplify(
+                points, faces.astype(np.int32), target_count=most, agg=_BOLDNESS
+            )
+    found, left = _parted(fitted(np.asarray(some, np.float64), points), unfolded(few))
+    return (found, left) if len(left) and is_closed(left) else None
 
 
 def is_closed(faces: Int64[np.ndarray, "faces 3"]) -> bool:
@@ -116,13 +77,17 @@ def is_closed(faces: Int64[np.ndarray, "faces 3"]) -> bool:
 
 def _edges(faces: Faces) -> tuple[Int64[np.ndarray, " edges"], Int64[np.ndarray, " edges"]]:
     """Return where the edges of all triangles start and end, three for each."""
-    return faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    one, two, three = np.ascontiguousarray(faces.T)
+    return np.concatenate([one, two, three]), np.concatenate([two, three, one])
 
 
-def _unfolded(faces: Int[np.ndarray, "n 3"]) -> Int64[np.ndarray, "m 3"]:
+def unfolded(faces: Int[np.ndarray, "n 3"]) -> Int64[np.ndarray, "m 3"]:
     """Return triangles without pairs that lie on each other, back to back."""
     faces = faces.astype(np.int64)
-    low, middle, high = np.sort(faces, axis=1).T
+    one, two, three = np.ascontiguousarray(faces.T)
+    low = np.minimum(np.minimum(one, two), three)
+    high = np.maximum(np.maximum(one, two), three)
+    middle = one + two + three - low - high
     count = int(faces.max(initial=0)) + 1
     key = (low * count + middle) * count + high
     order = np.sort(key)
@@ -131,7 +96,8 @@ def _unfolded(faces: Int[np.ndarray, "n 3"]) -> Int64[np.ndarray, "m 3"]:
         return faces
     group = np.searchsorted(twice, key).clip(max=len(twice) - 1)
     alone = twice[group] != key
-    single, faces, group = faces[alone], faces[~alone], group[~alone]
+    single = faces.take(np.flatnonzero(alone), axis=0)
+    faces, group = faces[~alone], group[~alone]
     up = (faces < np.roll(faces, -1, axis=1)).sum(axis=1) == 2
     more = np.bincount(group, np.where(up, 1, -1)).astype(np.int64)
     kept = np.flatnonzero(np.where(up, more[group] > 0, more[group] < 0))
@@ -139,14 +105,6 @@ def _unfolded(faces: Int[np.ndarray, "n 3"]) -> Int64[np.ndarray, "m 3"]:
     group = group[kept]
     number = np.arange(len(kept)) - np.searchsorted(group, group)
     return np.concatenate([single, faces[kept[number < np.abs(more[group])]]])
-
-
-def _in_touching_edges(faces: Faces) -> Int64[np.ndarray, " points"]:
-    """Return the points at edges with more than one triangle on a side, some of them twice."""
-    start, end = _edges(faces)
-    count = int(faces.max(initial=0)) + 1
-    key = np.sort(start * count + end)
-    return np.concatenate(np.divmod(key[1:][key[1:] == key[:-1]], count))
 
 
 def _parted(points: Points, faces: Faces) -> tuple[Points, Faces]:
@@ -159,8 +117,8 @@ def _parted(points: Points, faces: Faces) -> tuple[Points, Faces]:
         if len(touching) == 0:
             break
         one, two = divmod(int(touching[0]), len(points))
-        there = np.flatnonzero((start == one) & (end == two)) // 3
-        back = np.flatnonzero((start == two) & (end == one)) // 3
+        there = np.flatnonzero((start == one) & (end == two)) % len(faces)
+        back = np.flatnonzero((start == two) & (end == one)) % len(faces)
         if len(there) != len(back):
             break
         middle = np.tile(len(points) + np.arange(len(there)), 2)[:, None]
@@ -172,7 +130,7 @@ def _parted(points: Points, faces: Faces) -> tuple[Points, Faces]:
     return points, faces
 
 
-def _fitted(points: Points, like: Float[np.ndarray, "others 3"]) -> Points:
+def fitted(points: Points, like: Float[np.ndarray, "others 3"]) -> Points:
     """Return points moved and scaled along each axis to the bounds of others."""
     low, high = like.min(axis=0), like.max(axis=0)
     first, last = points.min(axis=0), points.max(axis=0)

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from panoscene.geometry import perspective_crop, view_relative_yaw
 from panoscene.models._editions import Edition
-from panoscene.models._weights import config_of, read_weights, weights_file
+from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh, built_in
 
 from ._config import CONFIGS
@@ -130,6 +130,5 @@ def load_shape_stage(
         CheckpointError: The weights are missing or for another network.
     """
     path = weights_file(STAGE, edition, weights)
-    network = build_shape(config_of(path, CONFIGS[edition], stage=STAGE, edition=edition))
-    read_weights(path, network, stage=STAGE, edition=edition)
+    network = load_network(path, build_shape, CONFIGS[edition], stage=STAGE, edition=edition)
     return ShapeStage(network, device)

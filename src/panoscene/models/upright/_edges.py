@@ -5,9 +5,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.ndimage
 import torch
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Float, Float32, Float64, Int64
 from torch import Tensor
 
 from panoscene.geometry import camera_from_turned, perspective_directions, pixel_from_direction
@@ -115,11 +114,33 @@ def _slopes(
     slope /= (slope * at).sum()
 
     def along(across: np.ndarray, down: np.ndarray) -> np.ndarray:
-        return scipy.ndimage.correlate1d(
-            scipy.ndimage.correlate1d(views, across, axis=2), down, axis=1
-        )
+        # a view at a time stays in the processor's cache
+        return np.stack([_correlated(_correlated(view, across, 1), down, 0) for view in views])
 
     return along(slope, blur), along(blur, slope)
+
+
+def _correlated(
+    view: Float32[np.ndarray, "rows columns"], weights: Float64[np.ndarray, " n"], axis: int
+) -> Float32[np.ndarray, "rows columns"]:
+    """Return a view correlated with weights that are even or odd, its borders mirrored.
+
+    The numbers are those of ``scipy.ndimage.correlate1d``, which takes long to import.
+    """
+    reach, size = len(weights) // 2, view.shape[axis]
+    borders = [(0, 0), (0, 0)]
+    borders[axis] = (reach, reach)
+    wide = np.pad(view.astype(np.float64), borders, mode="symmetric")
+
+    def moved(step: int) -> np.ndarray:
+        part = slice(reach + step, reach + step + size)
+        return wide[part] if axis == 0 else wide[:, part]
+
+    combined = np.add if weights[0] == weights[-1] else np.subtract
+    total = moved(0) * weights[reach]
+    for step in range(-reach, 0):
+        total += combined(moved(step), moved(-step)) * weights[reach + step]
+    return total.astype(np.float32)
 
 
 def _crests(

@@ -3,8 +3,9 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-import scipy.sparse
 from jaxtyping import Float64, Int64
+
+from panoscene.geometry import connected_components
 
 from ._edges import EdgePoints
 
@@ -85,9 +86,8 @@ def _groups(points: EdgePoints) -> tuple[Int64[np.ndarray, " n"], int]:
             starts.append(np.flatnonzero(joined))
             ends.append(other[joined])
         start, end = np.concatenate(starts), np.concatenate(ends)
-        graph = scipy.sparse.coo_array((np.ones(len(start)), (start, end)), shape=(number, number))
-        _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-        labels.append(label.astype(np.int64))
+        label = connected_components(number, start, end)
+        labels.append(label)
         sizes.append(np.bincount(label)[label])
     second = sizes[1] > sizes[0]
     return _renumbered(np.where(second, labels[1] + number, labels[0]))

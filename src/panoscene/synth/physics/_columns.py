@@ -7,6 +7,8 @@ from jaxtyping import Float64, Int8, Int64
 
 _AT_ONCE = 4_000_000
 """Pairs of a triangle and a line that are looked at together."""
+_FLAT = 1e-12
+"""Cells of a triangle's plan; those of less are parallel to the lines."""
 _WHERE = np.array([0.5137, 0.4771])
 """Place of a line in its cell: not the middle, where diagonals of faces often run."""
 
@@ -86,10 +88,19 @@ def column_hits(triangles: Float64[np.ndarray, "faces 3 3"], columns: Columns) -
     last = np.floor(most + 1e-9).astype(np.int64)
     last = np.minimum(last, np.array(columns.shape) - 1)
     span = (last - first + 1).clip(min=0)
-    count = span[:, 0] * span[:, 1]
+    edge_b, edge_c = b - a, c - a
+    area = edge_b[:, 0] * edge_c[:, 1] - edge_b[:, 1] * edge_c[:, 0]
+    count = np.where(np.abs(area) < _FLAT, 0, span[:, 0] * span[:, 1])
     keep = np.flatnonzero(count)
     found = [
-        _cut(triangles[part, :, 2], plan[part], first[part], span[part], columns)
+        _cut(
+            triangles[part, :, 2],
+            plan[part],
+            first[part],
+            span[part],
+            area=area[part],
+            columns=columns,
+        )
         for part in _parts(keep, count[keep])
     ]
     if not found:
@@ -113,23 +124,24 @@ def _cut(
     plan: Float64[np.ndarray, "n 3 2"],
     first: Int64[np.ndarray, "n 2"],
     span: Int64[np.ndarray, "n 2"],
+    *,
+    area: Float64[np.ndarray, " n"],
     columns: Columns,
 ) -> Hits:
     count = span[:, 0] * span[:, 1]
     owner = np.repeat(np.arange(len(count)), count)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    row, column = np.divmod(within, span[owner, 1])
-    row += first[owner, 0]
-    column += first[owner, 1]
-    edge_a, edge_b = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
-    area = edge_a[:, 0] * edge_b[:, 1] - edge_a[:, 1] * edge_b[:, 0]
-    flat = np.abs(area) < 1e-12
-    inverse = np.where(flat, 0.0, 1.0 / np.where(flat, 1.0, area))[owner]
-    x, y = row - plan[owner, 0, 0], column - plan[owner, 0, 1]
-    b = (x * edge_b[owner, 1] - y * edge_b[owner, 0]) * inverse
-    c = (y * edge_a[owner, 0] - x * edge_a[owner, 1]) * inverse
-    hit = (b >= -1e-9) & (c >= -1e-9) & (b + c <= 1 + 1e-9) & ~flat[owner]
+    row, column = np.divmod(within, np.repeat(span[:, 1], count))
+    row += np.repeat(first[:, 0], count)
+    column += np.repeat(first[:, 1], count)
+    edge_b, edge_c = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
+    inverse = np.repeat(1.0 / area, count)
+    x, y = row - np.repeat(plan[:, 0, 0], count), column - np.repeat(plan[:, 0, 1], count)
+    b = (x * np.repeat(edge_c[:, 1], count) - y * np.repeat(edge_c[:, 0], count)) * inverse
+    c = (y * np.repeat(edge_b[:, 0], count) - x * np.repeat(edge_b[:, 1], count)) * inverse
+    hit = np.flatnonzero((b >= -1e-9) & (c >= -1e-9) & (b + c <= 1 + 1e-9))
+    owner, b, c = owner[hit], b[hit], c[hit]
     rise_b, rise_c = heights[:, 1] - heights[:, 0], heights[:, 2] - heights[:, 0]
     height = heights[owner, 0] + b * rise_b[owner] + c * rise_c[owner]
     side = np.where(area > 0, -1, 1).astype(np.int8)[owner]
-    return Hits((row * columns.shape[1] + column)[hit], height[hit], side[hit])
+    return Hits(row[hit] * columns.shape[1] + column[hit], height, side)

@@ -50,12 +50,14 @@ def blocked_moves(
         frame: Orthonormal rows; the moves are along the last one.
         reach: Only moves up to this length are of interest.
     """
-    spans = [(first.span(row), second.span(row)) for row in frame]
-    low = np.array([max(a[0], b[0]) for a, b in spans[:2]])
-    high = np.array([min(a[1], b[1]) for a, b in spans[:2]])
-    if (high <= low).any():
-        return np.zeros((0, 2))
-    a_span, b_span = spans[2]
+    shared = []
+    for row in frame[:2]:
+        a_span, b_span = first.span(row), second.span(row)
+        shared.append((max(a_span[0], b_span[0]), min(a_span[1], b_span[1])))
+        if shared[-1][1] <= shared[-1][0]:  # nearly all pairs end here
+            return np.zeros((0, 2))
+    low, high = np.array(shared).T
+    a_span, b_span = first.span(frame[2]), second.span(frame[2])
     if b_span[0] - a_span[1] > reach or a_span[0] - b_span[1] > reach:
         return np.zeros((0, 2))
     columns = columns_over(low, high)

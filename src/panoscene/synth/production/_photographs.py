@@ -64,12 +64,13 @@ def photograph_home(
     furnished, scene, cameras = _prepared(job, recipe.cameras, recipe.width, models)
     numbers = {f"{job.home}-{k}": k for k in range(recipe.cameras)}
     files = FileChoice(recipe.jpeg_quality, recipe.normals, recipe.albedo)
+    lit = None
     for light_number in range(_LIGHTS):
         wanted = [c for c in job.cameras if numbers[c.name] % _LIGHTS == light_number]
         if not wanted:
             continue
         light = sample_light(np.random.default_rng([job.seed, 8, light_number]), scene)
-        lit = renderer.light_up(scene, light)
+        lit = renderer.light_up(scene, light, like=lit)
         for camera_job in wanted:
             camera = cameras[numbers[camera_job.name]]
             picture = lit.photograph(
@@ -83,8 +84,6 @@ def photograph_home(
             write_panorama(panorama, root, split=job.split, files=files, extra=extra)
             if written is not None:
                 written(camera_job.name)
-        # before the next one is built: one of them takes hundreds of MB
-        del lit
 
 
 def _prepared(

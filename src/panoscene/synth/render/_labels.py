@@ -29,8 +29,8 @@ def cast_labels(tracer: Tracer, camera: Camera) -> Labels:
     x, y = mi.Float(index % width) + 0.5, mi.Float(index // width) + 0.5
     ray = tracer.camera_ray(camera, x / width, y / height)
     every = mi.Bool(True)
-    hit, pane_met, pane = tracer.cast(ray, every, every, every)
-    surface = meet(tracer.engine, stage, ray, hit, hit.valid, sharp=every)
+    hit, pane_met, pane = tracer.cast(ray, every, every)
+    surface = meet(tracer.engine, stage, ray, hit, hit.valid)
     normal = dr.select(hit.valid, surface.smooth, 0)
     colour = dr.select(hit.valid, surface.colour, 0)
     dr.eval(hit.t, hit.face, hit.valid, pane_met, pane, normal, colour)

@@ -52,16 +52,18 @@ def outside_picture(
     noise = _fractal(rng)
     place = str(rng.choice(["garden", "street", "field", "city"], p=[0.3, 0.35, 0.15, 0.2]))
     eye = 1.6 + 2.9 * int(rng.integers(0, {"city": 9, "street": 5}.get(place, 2)))
-    picture = _sky(lon, lat, light, noise, rng)
-    picture *= np.float32(
-        light.sky_radiance / max(float((picture[: height // 2] @ LUMINANCE).mean()), 1e-9)
+    half = height // 2
+    picture = np.zeros((height, width, 3), np.float32)
+    picture[:half] = _sky(lon[:half], lat[:half], light, noise, rng)
+    picture[:half] *= np.float32(
+        light.sky_radiance / max(float((picture[:half] @ LUMINANCE).mean()), 1e-9)
     )
     day = light.kind in ("sunny", "overcast")
     sun = np.zeros(3) if light.sun_irradiance is None else np.array(light.sun_irradiance)
-    over = picture[: height // 2].mean(axis=(0, 1))
+    over = picture[:half].mean(axis=(0, 1))
     flat = (over * np.pi + sun * np.sin(light.sun_elevation)) / np.pi
     upright = (over * np.pi * 0.55 + sun * 0.45) / np.pi
-    haze = picture[height // 2 - 4].copy()
+    haze = picture[half - 4].copy()
     canvas = _Canvas(picture, lon, lat, haze, eye, noise, rng)
     _ground(canvas, flat, place)
     _trees(canvas, upright, rng.uniform(180, 400), 22.0)
@@ -101,7 +103,7 @@ _SKIES = {
 
 
 def _sky(lon, lat, light, noise, rng) -> Float32[np.ndarray, "height width 3"]:
-    """Return the sky with clouds; only the upper half matters."""
+    """Return the sky with clouds; the latitudes are those of its upper half."""
     zenith, horizon = (np.array(c, np.float32) for c in _SKIES[light.kind])
     up = np.clip(np.sin(lat), 0, 1)[..., None]
     picture = horizon + (zenith - horizon) * up ** np.float32(rng.uniform(0.35, 0.6))

@@ -1,5 +1,6 @@
 """All materials of a scene as tables that the tracer reads: no code differs between scenes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +55,7 @@ def pack_paints(materials: list[Material]) -> Paints:
         if material.normal_map is not None:
             key = (id(material.normal_map),)
             if key not in starts:
-                packed = _joined(_shrunk(material.normal_map))
+                packed = _joined([*np.moveaxis(_shrunk(material.normal_map), -1, 0)])
                 starts[key] = (normal_count, packed.shape[1], packed.shape[0])
                 normals.append(packed.reshape(-1))
                 normal_count += packed.size
@@ -75,6 +76,11 @@ def linear(colour: np.ndarray | tuple[float, ...]) -> np.ndarray:
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
+_CODES = np.arange(256, dtype=np.uint8)
+_LIGHT = linear(_CODES / 255.0)
+"""Of every code: powers are slow, and a home has millions of texels."""
+
+
 def _texels(material: Material) -> UInt32[np.ndarray, "height width"]:
     """Return a material's colour and roughness, in rows from the top."""
     colour = np.clip(np.array(material.colour, np.float32), 0, 1)
@@ -82,35 +88,38 @@ def _texels(material: Material) -> UInt32[np.ndarray, "height width"]:
     if material.texture is not None:
         picture = _shrunk(material.texture)
     # a product of sRGB values is nearly the sRGB value of the product of lights
-    picture = np.minimum(picture * colour + 0.5, _WHITEST).astype(np.uint8)
+    tinted = np.minimum(_CODES[:, None] * colour + 0.5, _WHITEST).astype(np.uint8)
     rough = np.full((1, 1), round(255 * material.roughness), np.uint8)
     if material.roughness_map is not None:
         rough = _shrunk(material.roughness_map)
     height = max(picture.shape[0], rough.shape[0])
     width = max(picture.shape[1], rough.shape[1])
     picture, rough = _stretched(picture, height, width), _stretched(rough, height, width)
-    rough = np.maximum(rough, round(255 * _SMOOTHEST)).astype(np.uint8)
-    return _joined(np.concatenate([picture, rough[..., None]], axis=-1))
+    channels = [np.take(tinted[:, k], picture[..., k]) for k in range(3)]
+    return _joined([*channels, np.maximum(rough, np.uint8(round(255 * _SMOOTHEST)))])
 
 
-def _joined(image: np.ndarray) -> UInt32[np.ndarray, "height width"]:
-    joined = np.zeros(image.shape[:2], np.uint32)
-    for k in range(image.shape[-1]):
-        joined |= image[..., k].astype(np.uint32) << np.uint32(8 * k)
-    return joined
+def _joined(channels: Sequence[np.ndarray]) -> UInt32[np.ndarray, "height width"]:
+    """Return up to four channels of eight bits as one number, the first in the lowest bits."""
+    joined = np.zeros((*channels[0].shape, 4), np.uint8)
+    for k, channel in enumerate(channels):
+        joined[..., k] = channel
+    return joined.view("<u4")[..., 0].astype(np.uint32, copy=False)
 
 
 def _mean(packed: UInt32[np.ndarray, "height width"]) -> int:
     """Return the texel of the mean light of a texture."""
     sample = packed.reshape(-1)[:: max(1, packed.size // 20000)]
-    parts = np.stack([(sample >> np.uint32(8 * k)) & 255 for k in range(4)], axis=-1) / 255.0
-    light = linear(parts[:, :3]).mean(axis=0)
+    parts = np.stack([(sample >> np.uint32(8 * k)) & 255 for k in range(4)], axis=-1)
+    light = _LIGHT[parts[:, :3]].mean(axis=0)
     code = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    codes = (np.array([*code, parts[:, 3].mean()]) * 255 + 0.5).astype(int)
+    codes = (np.array([*code, (parts[:, 3] / 255.0).mean()]) * 255 + 0.5).astype(int)
     return int(sum(int(c) << (8 * k) for k, c in enumerate(codes)))
 
 
 def _stretched(image: np.ndarray, height: int, width: int) -> np.ndarray:
+    if image.shape[:2] == (height, width):
+        return image
     rows = (np.arange(height) * image.shape[0]) // height
     columns = (np.arange(width) * image.shape[1]) // width
     return image[rows][:, columns]

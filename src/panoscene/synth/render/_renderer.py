@@ -13,7 +13,7 @@ from panoscene.synth.render._light_choice import light_choice, room_grid
 from panoscene.synth.render._mitsuba import load_engine
 from panoscene.synth.render._outside import outside_picture
 from panoscene.synth.render._records import Camera, LightSetting, RenderedPanorama, RenderScene
-from panoscene.synth.render._stage import build_stage
+from panoscene.synth.render._stage import build_stage, relit_stage
 from panoscene.synth.render._tracer import Tracer
 from panoscene.synth.render._triangles import triangles_of
 
@@ -33,7 +33,12 @@ class Renderer:
         self._engine = load_engine(threads)
 
     def light_up(
-        self, scene: RenderScene, light: LightSetting, *, outside_width: int = 1536
+        self,
+        scene: RenderScene,
+        light: LightSetting,
+        *,
+        outside_width: int = 1536,
+        like: "LitScene | None" = None,
     ) -> "LitScene":
         """Return the scene in this light, ready for its cameras.
 
@@ -41,28 +46,42 @@ class Renderer:
             scene: the home.
             light: sky, sun and lamps.
             outside_width: of the panorama of the outside, in pixels.
+            like: the same scene in another light, with which this one shares what does not depend
+                on the light.
 
         Raises:
-            ValueError: if the scene has no solid surface.
+            ValueError: if the scene has no solid surface, or ``like`` is of another scene.
         """
-        return LitScene(self, scene, light, outside_width)
+        if like is not None and like.scene is not scene:
+            raise ValueError("like: found another scene in a light, expected the one to light up")
+        return LitScene(self, scene, light, outside_width, like)
 
 
 class LitScene:
-    """A home in one light. Hold one at a time: it takes a few hundred MB."""
+    """A home in one light. Hold those of one home at a time: they take a few hundred MB."""
 
     def __init__(
-        self, renderer: Renderer, scene: RenderScene, light: LightSetting, outside_width: int
+        self,
+        renderer: Renderer,
+        scene: RenderScene,
+        light: LightSetting,
+        outside_width: int,
+        like: "LitScene | None" = None,
     ) -> None:
         start = time.process_time()
         engine = renderer._engine
         # Dr.Jit keeps the memory of earlier scenes, whose arrays had other sizes
         engine.dr.flush_malloc_cache()
         lamps = lamps_of(scene, light)
-        stage = build_stage(engine, triangles_of(scene, lamps), scene.panes)
+        triangles = triangles_of(scene, lamps)
+        if like is None:
+            stage = build_stage(engine, triangles, scene.panes)
+        else:
+            stage = relit_stage(engine, like._tracer.stage, triangles)
         choice = light_choice(scene, lamps, light)
         outside = outside_picture(light, outside_width)
         self._engine, self._light = engine, light
+        self.scene = scene
         self._tracer = Tracer(engine, stage, room_grid(scene), choice, outside)
         self.seconds: dict[str, float] = {"scene": time.process_time() - start}
         """CPU seconds of each stage so far."""

@@ -1,6 +1,7 @@
 """The scene inside Mitsuba: three small worlds that rays are cast into, and their tables."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -46,20 +47,15 @@ class Stage:
 
 def build_stage(engine: Engine, triangles: Triangles, panes: tuple[WindowPane, ...]) -> Stage:
     """Return the worlds and tables of a scene."""
-    mi, dr = engine.mi, engine.dr
+    upload = partial(_uploaded, engine)
     paints = pack_paints(triangles.materials)
     flat, tangent = _face_frames(triangles)
     split = triangles.solids
-
-    def upload(array: np.ndarray) -> Any:
-        kind = mi.UInt32 if array.dtype == np.uint32 else mi.Float
-        return kind(np.ascontiguousarray(array).reshape(-1))
-
     return Stage(
         _world(engine, triangles.vertices, triangles.faces[:split]),
         _world(engine, triangles.vertices, triangles.faces[split:]),
         _world(engine, *_pane_mesh(panes)),
-        dr.opaque(mi.UInt32, split),
+        engine.dr.opaque(engine.mi.UInt32, split),
         upload(triangles.faces),
         upload(triangles.normals),
         upload(triangles.uv),
@@ -75,6 +71,22 @@ def build_stage(engine: Engine, triangles: Triangles, panes: tuple[WindowPane, .
         np.array([pane.instance for pane in panes] or [0], np.int32),
         np.array([pane.normal for pane in panes] or [(0, 0, 1)], np.float32),
     )
+
+
+def relit_stage(engine: Engine, stage: Stage, triangles: Triangles) -> Stage:
+    """Return a stage in the light of other lamps: all but the glow is shared with the first one.
+
+    Args:
+        engine: Mitsuba.
+        stage: of the scene in any light.
+        triangles: of the same scene in the new light.
+    """
+    return replace(stage, glow=_uploaded(engine, triangles.glow))
+
+
+def _uploaded(engine: Engine, array: np.ndarray) -> Any:
+    kind = engine.mi.UInt32 if array.dtype == np.uint32 else engine.mi.Float
+    return kind(np.ascontiguousarray(array).reshape(-1))
 
 
 def _world(engine: Engine, vertices: np.ndarray, faces: np.ndarray) -> Any:

@@ -32,16 +32,8 @@ class Surface:
     glow: Any
 
 
-def meet(
-    engine: Engine,
-    stage: Stage,
-    ray: Any,
-    hit: Any,
-    active: Any,
-    *,
-    sharp: Any,
-) -> Surface:
-    """Return the surface at a hit.
+def meet(engine: Engine, stage: Stage, ray: Any, hit: Any, active: Any) -> Surface:
+    """Return the surface at a hit, as it is seen.
 
     Args:
         engine: Mitsuba.
@@ -49,43 +41,85 @@ def meet(
         ray: the rays.
         hit: where they met a triangle of one of the worlds.
         active: rays that met one.
-        sharp: rays whose surfaces are seen; for the others, which only gather light, the normal of
-            the triangle and the mean colour of its paint will do, at a fraction of the memory.
     """
     mi, dr = engine.mi, engine.dr
-    face, detail = hit.face, active & sharp
-    corners = dr.gather(mi.Vector3u, stage.faces, face, detail)
+    face = hit.face
+    corners = dr.gather(mi.Vector3u, stage.faces, face, active)
     b, c = hit.prim_uv.x, hit.prim_uv.y
     weights = (1 - b - c, b, c)
     picks = (corners.x, corners.y, corners.z)
     normal, uv = mi.Vector3f(0), mi.Point2f(0)
     for weight, corner in zip(weights, picks, strict=True):
-        normal += weight * dr.gather(mi.Vector3f, stage.normals, corner, detail)
-        uv += weight * dr.gather(mi.Point2f, stage.uv, corner, detail)
-    flat = dr.gather(mi.Vector3f, stage.flat, face, active)
-    flat = dr.select(dr.dot(flat, ray.d) > 0, -flat, flat)
-    normal = dr.select(detail, normal, flat)
+        normal += weight * dr.gather(mi.Vector3f, stage.normals, corner, active)
+        uv += weight * dr.gather(mi.Point2f, stage.uv, corner, active)
+    flat = _flat_normal(engine, stage, ray, face, active)
     normal = normal * dr.rsqrt(dr.maximum(dr.squared_norm(normal), 1e-12))
     back = dr.dot(normal, flat) < 0
     normal = dr.select(back, -normal, normal)
     paint = dr.gather(mi.UInt32, stage.material, face, active)
-    table = [dr.gather(mi.UInt32, stage.paint, paint * 8 + k, active) for k in range(8)]
-    mean = [mi.Float((table[7] >> (8 * k)) & 255) * (1 / 255) for k in range(4)]
-    texel = _texture(engine, stage.texels, table[:3], uv, detail)
-    red, green, blue, rough = (dr.select(detail, a, b) for a, b in zip(texel, mean, strict=True))
-    colour = mi.Color3f(red, green, blue)
-    # a cubic through the sRGB curve, within 0.003
-    colour = colour * (colour * (colour * 0.305306 + 0.682171) + 0.012523)
+    place = [dr.gather(mi.UInt32, stage.paint, paint * 8 + k, active) for k in range(6)]
+    texel = _texture(engine, stage.texels, place[:3], uv, active)
     smooth = normal
-    normal = _bent(engine, stage, table[3:6], normal, uv=uv, back=back, face=face, active=detail)
+    normal = _bent(engine, stage, place[3:], normal, uv=uv, back=back, face=face, active=active)
     # the shading normal must see the ray
     facing = dr.dot(normal, ray.d)
     normal = dr.normalize(normal - ray.d * dr.maximum(facing + 0.02, 0))
+    glow = dr.gather(mi.Color3f, stage.glow, face, active & (face >= stage.first_veil))
+    return _painted(
+        engine, stage, ray, hit.t, paint=paint, texel=texel, normals=(flat, smooth, normal),
+        glow=glow, active=active,
+    )  # fmt: skip
+
+
+def meet_plainly(engine: Engine, stage: Stage, ray: Any, hit: Any, active: Any) -> Surface:
+    """Return the solid surface at a hit, for rays that only gather light.
+
+    The normal of the triangle and the mean colour of its paint do for those, at a fraction of the
+    time. The arguments are those of :func:`meet`.
+    """
+    mi, dr = engine.mi, engine.dr
+    flat = _flat_normal(engine, stage, ray, hit.face, active)
+    paint = dr.gather(mi.UInt32, stage.material, hit.face, active)
+    mean = dr.gather(mi.UInt32, stage.paint, paint * 8 + 7, active)
+    texel = [mi.Float((mean >> (8 * k)) & 255) * (1 / 255) for k in range(4)]
+    facing = dr.dot(flat, ray.d)
+    normal = dr.normalize(flat - ray.d * dr.maximum(facing + 0.02, 0))
+    return _painted(
+        engine, stage, ray, hit.t, paint=paint, texel=texel, normals=(flat, flat, normal),
+        glow=mi.Color3f(0), active=active,
+    )  # fmt: skip
+
+
+def _flat_normal(engine: Engine, stage: Stage, ray: Any, face: Any, active: Any) -> Any:
+    mi, dr = engine.mi, engine.dr
+    flat = dr.gather(mi.Vector3f, stage.flat, face, active)
+    return dr.select(dr.dot(flat, ray.d) > 0, -flat, flat)
+
+
+def _painted(
+    engine: Engine,
+    stage: Stage,
+    ray: Any,
+    t: Any,
+    *,
+    paint: Any,
+    texel: list[Any],
+    normals: tuple[Any, Any, Any],
+    glow: Any,
+    active: Any,
+) -> Surface:
+    """Return a surface of a paint, whose colour and roughness are given as texels hold them."""
+    mi, dr = engine.mi, engine.dr
+    flat, smooth, normal = normals
+    colour, rough = mi.Color3f(*texel[:3]), texel[3]
+    # a cubic through the sRGB curve, within 0.003
+    colour = colour * (colour * (colour * 0.305306 + 0.682171) + 0.012523)
     frame = mi.Frame3f(normal)
+    flags = dr.gather(mi.UInt32, stage.paint, paint * 8 + 6, active)
     extra = dr.gather(mi.Point2f, stage.metal_opacity, paint, active)
     gloss = dr.clip((0.85 - rough) * 5.0, 0, 1)
     return Surface(
-        ray(hit.t),
+        ray(t),
         flat,
         smooth,
         frame,
@@ -94,10 +128,10 @@ def meet(
         rough,
         extra.x,
         dr.maximum(gloss, extra.x),
-        (table[6] & MIRROR) != 0,
-        (table[6] & GLASS) != 0,
+        (flags & MIRROR) != 0,
+        (flags & GLASS) != 0,
         extra.y,
-        dr.gather(mi.Color3f, stage.glow, face, active & (face >= stage.first_veil)),
+        glow,
     )
 
 

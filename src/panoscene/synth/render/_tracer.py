@@ -12,7 +12,14 @@ from panoscene.synth.render._outside import SKY_CELLS, sky_cells
 from panoscene.synth.render._path import Hit, Path
 from panoscene.synth.render._records import Camera
 from panoscene.synth.render._stage import Stage
-from panoscene.synth.render._surface import Surface, leave, meet, reflected, sample_reflection
+from panoscene.synth.render._surface import (
+    Surface,
+    leave,
+    meet,
+    meet_plainly,
+    reflected,
+    sample_reflection,
+)
 
 _ROULETTE_FROM = 2
 _BANDS = 4
@@ -95,11 +102,18 @@ class Tracer:
             mi.PCG32(pixels * count, initstate=dr.opaque(mi.UInt64, seed + 1)),
         )  # fmt: skip
         limit = dr.opaque(mi.UInt32, depth)
+        # what is seen sharply needs far more code than what only gathers light
+        path, sampler = dr.while_loop(
+            (path, sampler),
+            lambda path, sampler: path.active & path.clear,
+            lambda path, sampler: self._bounce(path, sampler, limit),
+            label="sharp",
+        )
         path, sampler = dr.while_loop(
             (path, sampler),
             lambda path, sampler: path.active,
-            lambda path, sampler: self._bounce(path, sampler, limit),
-            label="paths",
+            lambda path, sampler: self._gather(path, sampler, limit),
+            label="gathering",
         )
         view = self._view_out(path.ray.d)
         path.light[path.outdoors] += path.beta * view
@@ -129,21 +143,21 @@ class Tracer:
     # ---- one bounce -------------------------------------------------------------------------
 
     def _bounce(self, path: Path, sampler: Any, limit: Any) -> tuple[Path, Any]:
-        """Return the paths after the next surface."""
-        dr = self.engine.dr
-        hit, pane_met, pane = self.cast(path.ray, path.depth == 0, path.active, path.clear)
-        s = meet(self.engine, self.stage, path.ray, hit, hit.valid, sharp=path.clear)
+        """Return the paths after the next surface, which is seen sharply."""
+        hit, pane_met, pane = self.cast(path.ray, path.depth == 0, path.active)
+        s = meet(self.engine, self.stage, path.ray, hit, hit.valid)
         veil = hit.valid & (hit.face >= self.stage.first_veil)
         choice, side = path.chance.next_float32(), path.chance.next_float32()
         glass = veil & s.glass
         passed = veil & (s.glass | (choice >= s.opacity))
-        framed = pane_met & path.clear & ~path.guided
+        framed = pane_met & ~path.guided
         path.framed |= framed
         path.guided |= framed
         turned = self._reflect_in_glass(path, s, glass, (pane_met, pane), hit.t)
         self._pass_through(path, s, passed & ~turned, glass)
         path.passes[passed | turned] += 1
-        self._escape(path, pane_met & ~turned, pane)
+        escaped = pane_met & ~turned
+        path.outdoors |= escaped
         surface = hit.valid & ~passed & ~turned
         path.light[surface] += path.beta * s.glow
         self._guide(path, s, surface)
@@ -153,24 +167,34 @@ class Tracer:
         self._turn_over(s, through)
         self._ask_a_light(path, sampler, s, surface & ~s.mirror)
         moved = (passed | turned) & (path.passes < _MOST_PASSES)
-        path.active &= surface | moved
+        path.active &= ~escaped & (surface | moved)
         self._scatter(path, sampler, s, surface)
-        path.active &= dr.max(path.beta) > 0
+        path.clear &= s.mirror | ~surface
         return path, sampler
 
-    def cast(self, ray: Any, coherent: Any, active: Any, clear: Any) -> tuple[Hit, Any, Any]:
-        """Return the nearest triangles, which rays meet a window pane before, and which pane.
+    def _gather(self, path: Path, sampler: Any, limit: Any) -> tuple[Path, Any]:
+        """Return the paths after the next surface, of which only the light matters."""
+        goes_on = path.active & (path.depth + 1 < limit)
+        solid, pane_met, pane = self._cast_solid(path.ray, path.active, goes_on)
+        self._escape(path, pane_met, pane)
+        surface = goes_on & solid.is_valid()
+        hit = Hit(solid.t, solid.prim_uv, solid.prim_index, surface)
+        s = meet_plainly(self.engine, self.stage, path.ray, hit, surface)
+        self._ask_a_light(path, sampler, s, surface & ~s.mirror)
+        path.active &= surface
+        self._scatter(path, sampler, s, surface)
+        return path, sampler
 
-        Only rays that are clear meet veils.
-        """
+    def cast(self, ray: Any, coherent: Any, active: Any) -> tuple[Hit, Any, Any]:
+        """Return the nearest triangles, which rays meet a window pane before, and which pane."""
         mi, dr = self.engine.mi, self.engine.dr
         stage = self.stage
         solid = stage.solids.ray_intersect_preliminary(ray, coherent, active)
         met = active & solid.is_valid()
         nearer = mi.Ray3f(ray)
         nearer.maxt = dr.select(met, solid.t, ray.maxt)
-        veil = stage.veils.ray_intersect_preliminary(nearer, coherent, active & clear)
-        veiled = active & clear & veil.is_valid()
+        veil = stage.veils.ray_intersect_preliminary(nearer, coherent, active)
+        veiled = active & veil.is_valid()
         nearer.maxt = dr.select(veiled, veil.t, nearer.maxt)
         pane = stage.panes.ray_intersect_preliminary(nearer, coherent, active)
         pane_met = active & pane.is_valid()
@@ -179,6 +203,20 @@ class Tracer:
         uv = dr.select(veiled, veil.prim_uv, solid.prim_uv)
         hit = Hit(t, uv, face, (met | veiled) & ~pane_met)
         return hit, pane_met, pane.prim_index // 2
+
+    def _cast_solid(self, ray: Any, active: Any, goes_on: Any) -> tuple[Any, Any, Any]:
+        """Return the nearest solid triangles, and the window panes that rays meet before.
+
+        The triangles behind a path's last bounce are of no interest, only whether one hides a pane.
+        """
+        mi, dr = self.engine.mi, self.engine.dr
+        pane = self.stage.panes.ray_intersect_preliminary(ray, False, active)
+        ahead = active & pane.is_valid()
+        nearer = mi.Ray3f(ray)
+        nearer.maxt = dr.select(ahead, pane.t, ray.maxt)
+        wanted = goes_on | ahead
+        solid = self.stage.solids.ray_intersect_preliminary(nearer, False, wanted)
+        return solid, ahead & ~solid.is_valid(), pane.prim_index // 2
 
     def _turn_over(self, s: Surface, where: Any) -> None:
         """Turn surfaces so that they are lit from behind."""
@@ -192,7 +230,7 @@ class Tracer:
         """Turn some of the clear paths around at a sheet of glass; return which ones."""
         mi, dr = self.engine.mi, self.engine.dr
         pane_met, pane = panes
-        sheet_met = glass | (pane_met & path.clear)
+        sheet_met = glass | pane_met
         normal = dr.select(pane_met, dr.gather(mi.Vector3f, self.n, pane, pane_met), s.flat)
         along = dr.dot(path.ray.d, normal)
         once = 0.04 + 0.96 * (1 - dr.minimum(dr.abs(along), 1)) ** 5
@@ -213,13 +251,11 @@ class Tracer:
         path.ray = dr.select(through, behind, path.ray)
 
     def _escape(self, path: Path, escaped: Any, pane: Any) -> None:
-        """Add the daylight that paths meet by chance, and end them."""
+        """Add the daylight that paths meet by chance."""
         dr = self.engine.dr
         asked = self._chance(path.room, pane, escaped) * self._pane_pdf(path.ray, pane, escaped)
         weight = path.pdf / dr.maximum(path.pdf + asked, 1e-9)
-        path.light[escaped & ~path.clear] += path.beta * self._sky(path.ray.d) * weight
-        path.outdoors |= escaped & path.clear
-        path.active &= ~escaped
+        path.light[escaped] += path.beta * self._sky(path.ray.d) * weight
 
     def _guide(self, path: Path, s: Surface, surface: Any) -> None:
         """Keep colour and normal of the first surface that is no mirror, for the denoiser."""
@@ -234,7 +270,6 @@ class Tracer:
         choice, xi = path.chance.next_float32(), sampler.next_2d(surface)
         way, weight, density = sample_reflection(self.engine, s, choice, xi)
         path.beta[surface] *= weight
-        path.clear &= s.mirror | ~surface
         path.pdf[surface] = density
         path.room[surface] = self._room_of(s.place)
         path.ray = dr.select(surface, leave(self.engine, s, way), path.ray)
@@ -243,7 +278,7 @@ class Tracer:
         risky = surface & (path.depth >= _ROULETTE_FROM)
         lucky = path.chance.next_float32() < keep
         path.beta[risky] *= dr.rcp(dr.maximum(keep, 1e-3))
-        path.active &= ~risky | lucky
+        path.active &= (~risky | lucky) & (dr.max(path.beta) > 0)
 
     # ---- lights -----------------------------------------------------------------------------
 

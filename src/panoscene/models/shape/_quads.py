@@ -1,0 +1,223 @@
+"""Surfaces of blocks as quads with corners in cells: few of them where the surface is flat."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int64, UInt8
+from torch import Tensor
+
+from ._cubes import (
+    ALL_INSIDE,
+    CELLS,
+    CORNERS,
+    EDGES,
+    at,
+    case_loops,
+    crossings,
+    mixed,
+    numbers_of,
+)
+from ._fewer import fitted, unfolded
+
+_FLAT = (0.985, 0.93)
+"""A block, and an eighth of one, are flat where normals add up to that share of their number."""
+_BITS = 6
+_OWN = 1 << _BITS
+"""Cells of a block, and edges along each axis."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Tables:
+    """Constants of blocks of 4 x 4 x 4 cells."""
+
+    cells: Int64[Tensor, "64 3"]
+    eighth: Int64[Tensor, " 64"]
+    """Of the block, that each cell is in."""
+    slope: Float[Tensor, "125 192"]
+    """From values to differences along each axis, in each cell."""
+    around: Int64[Tensor, "3 4 3"]
+    """From where an edge along each axis starts to the cells around it, counter-clockwise."""
+    number: Int64[Tensor, "3 4"]
+    """Of that edge, in each of the four."""
+    loop: Int64[Tensor, "256 12"]
+    """Which of the surface's parts in a cell of each case goes through each edge."""
+    parts: Int64[Tensor, " 256"]
+    """How many there are."""
+    within: Bool[Tensor, "2 192"]
+    """Whether all cells around an edge are in the same block, and in the same eighth."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Parts:
+    """Parts of the surface, one or more in each cell that it passes through."""
+
+    block: Int64[Tensor, " parts"]
+    eighth: Int64[Tensor, " parts"]
+    flat: tuple[Bool[Tensor, " blocks"], Bool[Tensor, " eighths"]]
+    known: Int64[Tensor, " cells"]
+    """Number of each cell's first part, times 256, plus the case."""
+
+    def vertices(self) -> Int64[Tensor, " parts"]:
+        """Return the vertex of each part."""
+        count, blocks = len(self.block), len(self.flat[0])
+        found = torch.arange(count)
+        found = torch.where(at(self.flat[1], self.eighth), count + blocks + self.eighth, found)
+        found = torch.where(at(self.flat[0], self.block), count + self.block, found)
+        used = torch.zeros(count + 9 * blocks, dtype=torch.int64).index_fill_(0, found, 1)
+        return at(used.cumsum(0) - 1, found)
+
+
+def gathered_surface(
+    values: Float[Tensor, "blocks 125"],
+    cases: UInt8[Tensor, "blocks 64"],
+    place: Int64[Tensor, "blocks 3"],
+    count: int,
+    *,
+    least: int = 0,
+) -> tuple[Float[np.ndarray, "vertices 3"], Int64[np.ndarray, "faces 3"]]:
+    """Return a surface like that of ``march``, in the same bounds, with much fewer triangles.
+
+    Each part of the surface in a cell has a vertex, in the middle of where it crosses edges, and
+    around each crossed edge there is a quad, cut in two (dual marching cubes: Nielson 2004). Where
+    the surface is flat, 64 or 8 cells have one vertex. Some edges may have more than two
+    triangles, always as many on one side as on the other.
+
+    Args:
+        values: This and the others are what ``march`` takes.
+        cases: Of the cells.
+        place: Of the blocks.
+        count: Blocks along each axis of the grid.
+        least: Triangles. If there would be fewer, no blocks but only eighths are taken for flat.
+    """
+    tables = _tables()
+    values, cases, place = values.cpu(), cases.cpu(), place.cpu()
+    points, block, edge, rises = crossings(values, place)
+    steps = torch.tensor([(CELLS * count) ** 2, CELLS * count, 1])
+    base, local = (CELLS * place * steps).sum(1), (tables.cells * steps).sum(1)
+    parts = _parts(values, cases, base, local, (CELLS * count) ** 3)
+    axis, cell = edge >> _BITS, edge & (_OWN - 1)
+    start = at(base, block) + at(local, cell)
+    eighth = 8 * block + at(tables.eighth, cell)
+    inner = [at(within, edge) for within in tables.within]
+    around = (tables.around * steps).sum(2)
+    for flat_blocks in (parts.flat[0], torch.zeros_like(parts.flat[0])):
+        parts = replace(parts, flat=(flat_blocks, parts.flat[1]))
+        # edges within a cube that has one vertex are not seen
+        gone = inner[0] & at(flat_blocks, block) | inner[1] & at(parts.flat[1], eighth)
+        seen = numbers_of(~gone)
+        along = at(axis, seen)
+        found = at(parts.known, at(start, seen)[:, None] + around.index_select(0, along))
+        number = (found & ALL_INSIDE) * len(EDGES) + tables.number.index_select(0, along)
+        corner = at(parts.vertices(), (found >> 8) + at(tables.loop, number))
+        faces = _triangles(corner, at(rises, seen))
+        if len(faces) >= least:
+            break
+    mean = _means(corner, points.index_select(0, seen))
+    used = np.zeros(len(mean), bool)
+    used[faces] = True
+    bounds = torch.stack(points.aminmax(dim=0)).numpy()
+    return fitted(mean.compress(used, axis=0), bounds), (used.cumsum() - 1).take(faces)
+
+
+def _parts(
+    values: Float[Tensor, "blocks 125"],
+    cases: UInt8[Tensor, "blocks 64"],
+    base: Int64[Tensor, " blocks"],
+    local: Int64[Tensor, " 64"],
+    cells: int,
+) -> _Parts:
+    """Return the parts of the surface.
+
+    Args:
+        values: At the nodes.
+        cases: Of the cells.
+        base: Number of each block's first cell in the grid.
+        local: What is added for the others.
+        cells: Of the grid.
+    """
+    tables = _tables()
+    number = numbers_of(mixed(cases))
+    block, cell = number >> _BITS, number & (_OWN - 1)
+    eighth = 8 * block + at(tables.eighth, cell)
+    case = at(cases, number).long()
+    count = at(tables.parts, case)
+    x, y, z = (values @ tables.slope).view(-1, 3).index_select(0, number).t().contiguous()
+    length = (x * x + y * y + z * z).sqrt_().clamp_min_(1e-9)
+    # where a cell has several parts nothing is flat
+    least = torch.where(count == 1, 1.0, torch.inf)
+    flat = []
+    for cube, share, cubes in ((block, _FLAT[0], len(base)), (eighth, _FLAT[1], 8 * len(base))):
+        total = [torch.bincount(cube, along / length, cubes).square_() for along in (x, y, z)]
+        flat.append(sum(total) > (share * torch.bincount(cube, least, cubes)).square_())
+    known = torch.zeros(cells, dtype=torch.int64)
+    known[at(base, block) + at(local, cell)] = ((count.cumsum(0) - count) << 8) + case
+    block, eighth = block.repeat_interleave(count), eighth.repeat_interleave(count)
+    return _Parts(block, eighth, (flat[0], flat[1]), known)
+
+
+def _triangles(
+    corner: Int64[Tensor, "quads 4"], rises: Bool[Tensor, " quads"]
+) -> Int64[np.ndarray, "faces 3"]:
+    """Return two triangles of each quad, as far as they have an area."""
+    one, two, three, four = corner.unbind(1)
+    two, four = torch.where(rises, two, four), torch.where(rises, four, two)
+    found = []
+    for triangle in ((one, two, three), (one, three, four)):
+        a, b, c = triangle
+        some = numbers_of((a != b) & (b != c) & (c != a))
+        found.append(torch.stack([at(part, some) for part in triangle], 1))
+    return unfolded(torch.cat(found).numpy())
+
+
+def _means(
+    corner: Int64[Tensor, "quads 4"], points: Float[Tensor, "quads 3"]
+) -> Float[np.ndarray, "vertices 3"]:
+    """Return the middle of the points of each vertex."""
+    member = corner.flatten()
+    size = torch.bincount(member).clamp_(min=1)
+    total = [torch.bincount(member, along.repeat_interleave(4)) for along in points.double().t()]
+    return (torch.stack(total, 1) / size[:, None]).numpy()
+
+
+@cache
+def _tables() -> _Tables:
+    axes = torch.eye(3, dtype=torch.int64)
+    turns = ((1, 1), (0, 1), (0, 0), (1, 0))
+    around = -torch.stack(
+        [
+            torch.stack([one * axes[axis - 2] + other * axes[axis - 1] for one, other in turns])
+            for axis in range(3)
+        ]
+    )
+    corner = {place: number for number, place in enumerate(CORNERS)}
+    number = [
+        [
+            EDGES.index((corner[(*low,)], corner[(*high,)]))
+            for low, high in zip(lows, highs, strict=True)
+        ]
+        for lows, highs in zip((-around).tolist(), (axes[:, None] - around).tolist(), strict=True)
+    ]
+    loop = torch.zeros(1 << 8, len(EDGES), dtype=torch.int64)
+    rings = [case_loops(case) for case in range(len(loop))]
+    for case, found in enumerate(rings):
+        for place, ring in enumerate(found):
+            loop[case, ring] = place
+    cells = torch.cartesian_prod(*(torch.arange(CELLS),) * 3)
+    nodes = torch.tensor([(CELLS + 1) ** 2, CELLS + 1, 1])
+    slope = torch.zeros((CELLS + 1) ** 3, _OWN, 3)
+    for place in torch.tensor(CORNERS):
+        slope[((cells + place) * nodes).sum(1), torch.arange(_OWN)] += (2 * place - 1).float()
+    across = axes.repeat_interleave(_OWN, 0) > 0
+    first = cells.repeat(3, 1)
+    return _Tables(
+        cells=cells,
+        eighth=(cells // 2 * torch.tensor([4, 2, 1])).sum(1),
+        slope=slope.flatten(1),
+        around=around,
+        number=torch.tensor(number),
+        loop=loop,
+        parts=torch.tensor([len(found) for found in rings]),
+        within=torch.stack([(across | (first % size > 0)).all(1) for size in (CELLS, 2)]),
+    )
