@@ -12,7 +12,7 @@ from torch import Tensor
 from panoscene.scene import write_atomically
 
 _FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
-_OPTIONS = {"PNG": {"compress_level": 6}, "JPEG": {"quality": 92}, "WEBP": {"quality": 90}}
+_OPTIONS = {"PNG": {"compress_level": 4}, "JPEG": {"quality": 92}, "WEBP": {"quality": 90}}
 
 
 def write_image(image: Float[Tensor, "3 height width"], path: str | os.PathLike[str]) -> None:
