@@ -183,8 +183,8 @@ def layout_text() -> dict[str, str]:
         rooms = val["panoramas"]
         texts["layout-worse"] = (
             f"On {val['part']} it is worse in {round(row['worse'] * rooms)} of {rooms} rooms, by "
-            f"at most {row['most_worse']:.3f}; {round(row['ambiguous'] * rooms)} of them are "
-            "`ambiguous`."
+            f"at most {row['most_worse']:.3f}. `ambiguous` is set for "
+            f"{round(row['ambiguous'] * rooms)} of the {rooms}."
         )
     return texts
 

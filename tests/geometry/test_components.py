@@ -27,6 +27,11 @@ def test_a_long_chain_is_one_component(seed: int) -> None:
     assert not found[:-1].any()
 
 
+def test_a_star_around_the_last_node_is_one_component() -> None:
+    leaves = np.arange(20_000)
+    assert not connected_components(20_001, leaves, np.full(20_000, 20_000)).any()
+
+
 def test_without_edges_every_node_is_alone() -> None:
     none = np.zeros(0, np.int64)
     assert connected_components(3, none, none).tolist() == [0, 1, 2]

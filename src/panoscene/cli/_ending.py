@@ -9,7 +9,8 @@ from contextlib import suppress
 class Ending:
     """Ends the process when all else is done, once it knows the exit code.
 
-    To take down large libraries object by object would take a second more.
+    To take down large libraries object by object would take a second more. What was registered with
+    ``atexit`` before this module was imported is not called.
     """
 
     def __init__(self) -> None:

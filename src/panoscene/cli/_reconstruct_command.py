@@ -3,6 +3,7 @@
 """The command that turns photos into scenes."""
 
 import math
+import threading
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -104,8 +105,10 @@ def reconstruct(
         steps=steps,
     )
     choice = Choice(camera_height, resolution, resume)
-    # the drivers of other devices do not survive a fork; computers of a cluster draw themselves
-    drawing = partial(artist, *_DRAWING, fork=device == "cpu") if ray is None else None
+    # other threads and the drivers of other devices do not survive a fork
+    fork = device == "cpu" and threading.active_count() == 1
+    # computers of a cluster draw themselves
+    drawing = partial(artist, *_DRAWING, fork=fork) if ray is None else None
     try:
         return reconstruct_files(make, files, output, choice, as_json=json, ray=ray, artist=drawing)
     except ModuleNotFoundError as error:

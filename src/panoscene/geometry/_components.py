@@ -23,8 +23,8 @@ def connected_components(
         first, second = root[one], root[two]
         apart = first != second
         one, two, first, second = one[apart], two[apart], first[apart], second[apart]
-        # each root with a lower one beside it is put under such a one: a half goes each time
-        root[np.maximum(first, second)] = np.minimum(first, second)
+        # each root with lower ones beside it is put under the lowest
+        np.minimum.at(root, np.maximum(first, second), np.minimum(first, second))
         while not np.array_equal(further := root[root], root):
             root = further
     # a root is the first node of its component

@@ -15,7 +15,8 @@ from panoscene.scene import Detections, Layout, Objects, Relations, Scene
 class Given:
     """Records that take the place of stages: ground truth, or another program's output.
 
-    They are in the frame of the upright panorama.
+    They are in the frame of the upright panorama. Of detections, objects or relations that are
+    given none is taken for a double.
     """
 
     detections: Detections | None = None

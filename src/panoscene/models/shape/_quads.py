@@ -89,7 +89,7 @@ def gathered_surface(
         cases: Of the cells.
         place: Of the blocks.
         count: Blocks along each axis of the grid.
-        least: Triangles. If there would be fewer, no blocks but only eighths are taken for flat.
+        least: Triangles. If there would be fewer, only eighths are taken for flat, then nothing.
     """
     tables = _tables()
     values, cases, place = values.cpu(), cases.cpu(), place.cpu()
@@ -102,10 +102,12 @@ def gathered_surface(
     eighth = 8 * block + at(tables.eighth, cell)
     inner = [at(within, edge) for within in tables.within]
     around = (tables.around * steps).sum(2)
-    for flat_blocks in (parts.flat[0], torch.zeros_like(parts.flat[0])):
-        parts = replace(parts, flat=(flat_blocks, parts.flat[1]))
+    blocks, eighths = parts.flat
+    none = torch.zeros_like(blocks), torch.zeros_like(eighths)
+    for flat in ((blocks, eighths), (none[0], eighths), none):
+        parts = replace(parts, flat=flat)
         # edges within a cube that has one vertex are not seen
-        gone = inner[0] & at(flat_blocks, block) | inner[1] & at(parts.flat[1], eighth)
+        gone = inner[0] & at(flat[0], block) | inner[1] & at(flat[1], eighth)
         seen = numbers_of(~gone)
         along = at(axis, seen)
         found = at(parts.known, at(start, seen)[:, None] + around.index_select(0, along))

@@ -136,7 +136,7 @@ def _correlated(
         part = slice(reach + step, reach + step + size)
         return wide[part] if axis == 0 else wide[:, part]
 
-    combined = np.add if weights[0] == weights[-1] else np.subtract
+    combined = np.add if np.array_equal(weights, weights[::-1]) else np.subtract
     total = moved(0) * weights[reach]
     for step in range(-reach, 0):
         total += combined(moved(step), moved(-step)) * weights[reach + step]
