@@ -127,6 +127,7 @@ def test_usage_errors(run: Run, arguments: list[str]) -> None:
         (["view", "room.json", "--port", "http"], "--port: found 'http', expected a whole number"),
         (["relations", "room.json", "--threshold", "x"], "--threshold: found 'x', expected a"),
         (["convert", "a.csv", "-o", "b.json", "--ceiling", "2,6"], "--ceiling: found '2,6', exp"),
+        (["arrange", "room.json", "-o", ""], "--output: found an empty name, expected that of"),
         (["draw", "room.json", "-o", "x", "--port", "abc"], "Unrecognized options: --port, abc"),
     ],
 )
@@ -261,6 +262,15 @@ def test_arrange_takes_files_folders_and_patterns(folder: Path, run: Run) -> Non
     assert "sum or" in out
     assert "4 → 0" in out
     assert "wrote o: 4 of 4" in out
+
+
+@pytest.mark.parametrize("output", [".", "room.json"])
+def test_arrange_does_not_write_a_scene_onto_itself(folder: Path, run: Run, output: str) -> None:
+    before = Path("room.json").read_bytes()
+    code, _, err = run("arrange", "room.json", "-o", output)
+    assert code == 2
+    assert f"--output {output}: found the place of room.json itself" in err
+    assert Path("room.json").read_bytes() == before
 
 
 def test_arrange_goes_on_after_a_bad_file(folder: Path, run: Run) -> None:
@@ -441,6 +451,7 @@ def test_bad_scenes_are_refused(folder: Path, run: Run, command: str, kind: str)
         (("experiment", "arrange", "--seed", "-1"), "--seed: found -1"),
         (("experiment", "arrange", "-o", "room.json"), "room.json: found a file"),
         (("demo", "--seed", "-1"), "--seed: found -1"),
+        (("arrange", "", "-o", "there"), "SCENE: found an empty name"),
         (("demo", "-o", "room.json"), "room.json: found a file"),
     ],
 )

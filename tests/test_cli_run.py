@@ -44,3 +44,9 @@ def test_an_error_of_the_program_is_shown() -> None:
     code, _, err = ended(f"{BEFORE}_program.main = lambda: 1 // 0; _program.run()")
     assert code == 1
     assert "ZeroDivisionError" in err
+
+
+def test_closed_streams_do_not_matter() -> None:
+    code = "import sys; sys.stdout = sys.stderr = None; from panoscene.cli import run; run()"
+    assert ended(code, "--version") == (0, "", "")
+    assert ended(code, "draw") == (2, "", "")

@@ -137,6 +137,46 @@ def test_resume_leaves_out_what_is_there(
     assert (folder / "scene.json").read_text() == "made before"
 
 
+def test_results_of_another_photo_do_not_count(
+    loaded: dict[str, Any], run: Run, photo: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "room"
+    other = shutil.copy(photo, tmp_path / "other.jpg")
+    assert run(other, "-o", folder, "--steps", 0)[0] == 0
+    code, out, _ = run(photo, "-o", folder, "--steps", 0, "--resume")
+    assert code == 0
+    assert "flat: a room" in out
+    assert json.loads((folder / "reconstruction.json").read_text())["photo"] == "flat.jpg"
+    assert "nothing was done" in run(photo, "-o", folder, "--resume")[1]
+
+
+def test_who_is_interrupted_over_older_results_leaves_no_scene(
+    loaded: dict[str, Any],
+    run: Run,
+    photo: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder = tmp_path / "room"
+    assert run(photo, "-o", folder, "--steps", 0)[0] == 0
+    files: list[Path] = []
+
+    def interrupted(path: Path, data: bytes) -> None:
+        files.append(path)
+        if len(files) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("panoscene.cli._results.write_bytes", interrupted)
+    assert run(photo, "-o", folder, "--steps", 0)[0] == 130
+    assert len(files) == 2
+    assert not (folder / "scene.json").exists()
+
+
+def test_an_empty_name_of_a_photo_is_refused(run: Run) -> None:
+    code, _, err = run("", "-o", "room")
+    assert (code, "PHOTO: found an empty name" in err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -95,6 +95,8 @@ def scene_files(arguments: Sequence[str]) -> list[Path]:
         raise InputError("SCENE: found nothing, expected scene.json files, folders or patterns")
     files: dict[Path, Path] = {}
     for argument in arguments:
+        if not argument:
+            raise InputError("SCENE: found an empty name, expected scene.json files or folders")
         path = Path(argument)
         if path.is_dir():
             named = path.glob("*.json")
@@ -118,9 +120,18 @@ def scene_targets(files: Sequence[Path], output: Path) -> Mapping[Path, Path]:
     """Return where the scene made from each file goes: a single .json file, or into a folder.
 
     Raises:
-        InputError: Several scenes would share a file, or the output is a file where a folder must
-            be.
+        InputError: Several scenes would share a file, a scene would be written onto itself, or the
+            output is a file where a folder must be.
     """
+    targets = _targets(files, output)
+    for file, target in targets.items():
+        if target.resolve() == file.resolve():
+            expected = "expected another place: the scene there would be lost"
+            raise InputError(f"--output {output}: found the place of {file} itself, {expected}")
+    return targets
+
+
+def _targets(files: Sequence[Path], output: Path) -> Mapping[Path, Path]:
     if output.suffix == ".json" and not output.is_dir():
         if len(files) > 1:
             found = f"one file for {len(files)} scenes"

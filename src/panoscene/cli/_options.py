@@ -29,9 +29,27 @@ def _number(kind: Callable[[str], Any], metavar: str, expected: str) -> Primitiv
 _WHOLE = _number(int, "N", "a whole number")
 _REAL = _number(float, "X", "a number")
 
+
+def _named(word: str) -> Path:
+    # an empty name, as of a variable of the shell that is not set, would be the current folder
+    if not word:
+        raise ValueError("found an empty name, expected that of a file or a folder")
+    return Path(word)
+
+
+_PLACE = PrimitiveConstructorSpec(
+    nargs=1,
+    metavar="OUT",
+    instance_from_str=lambda words: _named(words[0]),
+    is_instance=lambda value: value is None or isinstance(value, Path),
+    str_from_instance=lambda value: [str(value)],
+)
+
 # no "(default: None)": what happens without the option is part of its description
-Output = Annotated[Path, arg(aliases=("-o",), metavar="OUT")]
-OptionalOutput = Annotated[Path | None, arg(aliases=("-o",), metavar="OUT", help_behavior_hint="")]
+Output = Annotated[Path, arg(aliases=("-o",), metavar="OUT"), _PLACE]
+OptionalOutput = Annotated[
+    Path | None, arg(aliases=("-o",), metavar="OUT", help_behavior_hint=""), _PLACE
+]
 OptionalFile = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
 SceneFile = Annotated[Positional[Path], arg(metavar="SCENE")]
 Count = Annotated[int, arg(metavar="N"), _WHOLE]

@@ -5,6 +5,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import tyro
 
@@ -142,6 +143,10 @@ def run() -> None:
 
     When everything is written the process ends at once.
     """
+    for name in ("stdout", "stderr"):
+        # closed by whoever started the process
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     # that of an error, until it is known better
     ENDING.code = 1
     try:

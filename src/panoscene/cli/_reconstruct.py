@@ -2,6 +2,7 @@
 # The imports stand inside: who names a photo that cannot be used does not wait for torch.
 """Photos in, scenes out: which photos, where their results go, and what came of each."""
 
+import json
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -24,6 +25,8 @@ ENOUGH_COLUMNS = 4096
 """Of a photo: networks see 1,024, and 16,384 take gigabytes."""
 SCENE = "scene.json"
 """The file that is written last: where it is, everything is."""
+ACCOUNT = "reconstruction.json"
+"""The file that says how the scene came about, and of which photo it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +46,12 @@ def photo_files(arguments: Sequence[str]) -> list[Path]:
     """
     files: dict[Path, Path] = {}
     for argument in arguments:
+        if not argument:
+            raise InputError("PHOTO: found an empty name, expected photos, folders or patterns")
         path = Path(argument)
         if path.is_dir():
-            named = (file for file in path.iterdir() if file.suffix.lower() in PHOTOS)
+            inside = (file for file in path.iterdir() if file.suffix.lower() in PHOTOS)
+            named = filter(Path.is_file, inside)
         elif path.exists() or not any(mark in argument for mark in "*?["):
             named = iter([path])
         else:
@@ -91,8 +97,15 @@ class Task:
     choice: Choice
 
     def done(self) -> bool:
-        """Return whether the results are there."""
-        return (self.folder / SCENE).is_file()
+        """Return whether the results of this photo are there."""
+        if not (self.folder / SCENE).is_file():
+            return False
+        try:
+            account = json.loads((self.folder / ACCOUNT).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return True
+        name = self.file.resolve().name
+        return account.get("photo", name) == name
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,9 +167,14 @@ def reconstruct_files(
     entries = [told.get(task.file) or _there(task) for task in tasks]
     if as_json:
         say_json(entries)
-    elif len(files) > 1:
-        made = sum(entry["ok"] for entry in entries)
-        say(f"wrote {output}: {made} of {len(files)} photos")
+        return 0 if all(entry["ok"] for entry in entries) else 2
+    made = sum(entry["ok"] for entry in entries)
+    kept = sum(not entry.get("new", True) for entry in entries)
+    if len(files) > 1:
+        before = f", {kept} of them before" if kept else ""
+        say(f"wrote {output}: {made} of {len(files)} photos{before}")
+    elif kept:
+        say(f"{output}: the results are there, nothing was done")
     return 0 if all(entry["ok"] for entry in entries) else 2
 
 

@@ -59,7 +59,7 @@ def reconstruct(
     Args:
         photos: 2:1 panoramas (.jpg .png .webp .tif .bmp), folders of them, or quoted patterns.
         output: Folder for the results.
-        camera_height: Metres from the floor to the camera; the whole scene scales with it.
+        camera_height: Metres from the floor to the camera; the scene scales with it.
         edition: Of the networks: compact comes with its weights; paper needs --weights.
         weights: Folder with the networks' weights, instead of those that come with the package.
         device: Where the networks run: cpu, cuda, cuda:1 ...
@@ -68,7 +68,7 @@ def reconstruct(
             256. Meshes have up to 32 triangles for each.
         no_shapes: Leave out the meshes; objects are boxes.
         keep_frame: Take photos as they are, even if the camera was tilted.
-        resume: Leave out photos whose results are there.
+        resume: Leave out photos whose results are there, whatever the options were then.
         ray: Spread photos over a Ray cluster whose computers share their folder and OUT: the one
             at this address, or the running one; without any, over this computer. Needs pip
             install 'panoscene[ray]'.
