@@ -66,8 +66,7 @@ class Tracer:
     ) -> Float32[np.ndarray, "height width 9"]:
         """Return radiance, albedo and normal (camera frame) averaged over each pixel.
 
-        Pixels nearer to a pole than 45 degrees, which see little of the sphere, get half of the
-        samples.
+        Pixels nearer to a pole than 45 degrees, which see little, get half of the samples.
         """
         shares = [samples if 0 < k < _BANDS - 1 else -(-samples // 2) for k in range(_BANDS)]
         bands = [
@@ -75,8 +74,7 @@ class Tracer:
             for k, share in enumerate(shares)
         ]
         image = np.concatenate(bands)[: camera.width * camera.height]
-        image = image.reshape(camera.height, camera.width, 9)
-        return np.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
+        return np.nan_to_num(image.reshape(camera.height, camera.width, 9), posinf=0.0, neginf=0.0)
 
     def _trace_band(
         self, camera: Camera, samples: int, depth: int, seed: int, band: int
@@ -96,9 +94,8 @@ class Tracer:
         start, nothing = mi.Vector3f(ray.d), mi.Color3f(0)
         path = Path(
             mi.Ray3f(ray), nothing, mi.Color3f(1), mi.UInt32(0), mi.UInt32(0), mi.Bool(True),
-            mi.Bool(True),
-            mi.Float(1), mi.UInt32(0), mi.Bool(False), mi.Color3f(0), mi.Vector3f(0),
-            mi.Bool(False), mi.Bool(False),
+            mi.Bool(True), mi.Float(1), mi.UInt32(0), mi.Bool(False), mi.Color3f(0),
+            mi.Vector3f(0), mi.Bool(False), mi.Bool(False),
             mi.PCG32(pixels * count, initstate=dr.opaque(mi.UInt64, seed + 1)),
         )  # fmt: skip
         limit = dr.opaque(mi.UInt32, depth)
