@@ -10,6 +10,7 @@ from panoscene.cli import _measure_pipeline as measure
 from panoscene.cli import main
 from panoscene.models.shape import ShapeStage
 from panoscene.pipeline import Stages
+from panoscene.pipeline._load import AtFirstUse
 from panoscene.scene import Objects, Shapes
 
 from .conftest import Knowing
@@ -37,7 +38,7 @@ def quick(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> None:
         # whatever detections there are, the boxes are as many
         return knowing.stages(
             pose=lambda image, found, layout, height: knowing.truth.objects,
-            shape=KnowingShape(knowing),
+            shape=AtFirstUse(lambda: KnowingShape(knowing)),
         )
 
     monkeypatch.setattr(measure, "load_stages", load_stages)
