@@ -568,9 +568,12 @@ def test_view_shows_the_photo_upright_and_saves_its_name(
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 def test_view_ends_on_interrupt(folder: Path) -> None:
     program = Path(sys.executable).parent / "panoscene"
+    # jobs in the background of a shell ignore Ctrl-C, and so would what they start
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(
         [program, "view", "room.json", "--port", "0"], stderr=subprocess.PIPE, text=True
     )
+    signal.signal(signal.SIGINT, before)
     # whatever happens, the test does not wait forever
     limit = threading.Timer(120, process.kill)
     limit.start()
