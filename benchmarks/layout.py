@@ -100,24 +100,34 @@ def _scores(predict: Callable[[int], LayoutPrediction], truths: list[Scene]) -> 
 
     ``same_corners``: the number of corners is right; ``ambiguous``: there are two readings;
     ``worse``: the 2D IoU of the floor polygon is below that of the drawn one, by ``most_worse`` at
-    most.
+    most. ``iou_3d_ambiguous`` and ``iou_3d_clear`` are means over the rooms with and without two
+    readings, where there are some.
     """
     records: list[LayoutRecord] = []
-    same, torn, loss = 0, 0, []
+    same, torn, loss = 0, [], []
     for index, truth in enumerate(truths):
         found = predict(index)
         record = layout_record(scene_of(found, truth), truth)
         records.append(record)
         same += len(found.layout.floor_polygon) == len(truth.layout.floor_polygon)
-        torn += found.ambiguous
+        torn.append(found.ambiguous)
         if record.raw is not None:
             loss.append(record.raw.errors.iou_2d - record.regularised.errors.iou_2d)
-    return layout_scores(records) | {
-        "same_corners": same / len(truths),
-        "ambiguous": torn / len(truths),
-        "worse": sum(value > SAME for value in loss) / len(truths),
-        "most_worse": max([0.0, *loss]),
-    }
+    iou = [record.regularised.errors.iou_3d for record in records]
+    parts = {}
+    for name, wanted in (("iou_3d_ambiguous", True), ("iou_3d_clear", False)):
+        some = [value for value, one in zip(iou, torn, strict=True) if one == wanted]
+        parts |= {name: sum(some) / len(some)} if some else {}
+    return (
+        layout_scores(records)
+        | parts
+        | {
+            "same_corners": same / len(truths),
+            "ambiguous": sum(torn) / len(truths),
+            "worse": sum(value > SAME for value in loss) / len(truths),
+            "most_worse": max([0.0, *loss]),
+        }
+    )
 
 
 def _true(scene: Scene) -> Signals:
