@@ -39,6 +39,20 @@ def test_a_fork_has_what_is_loaded_here_and_works_with_one_thread() -> None:
         assert torch.equal(drawing.submit(torch.mm, ones, ones).result(60), product)
 
 
+@pytest.mark.parametrize("fork", [False, True])
+def test_tensors_stay_where_they_are(*, fork: bool) -> None:
+    # PyTorch moves what it sends to another process, and who reads it meanwhile crashes
+    image = torch.rand(3, 64, 128)
+    place = image.data_ptr()
+    with artist(fork=fork) as drawing:
+        total = drawing.submit(torch.sum, image).result(60)
+        assert (image.data_ptr(), image.is_shared()) == (place, False)
+        # sent as it was when it was given away
+        later = drawing.submit(torch.sum, image)
+        image.zero_()
+        assert torch.equal(later.result(60), total)
+
+
 _LOADED: list[int] = []
 
 

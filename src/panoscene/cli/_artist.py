@@ -2,15 +2,17 @@
 
 import logging
 import os
+import pickle
 import signal
 import sys
 import warnings
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
 from multiprocessing import get_context, parent_process
 from threading import Thread
+from typing import Any
 
 
 @contextmanager
@@ -26,7 +28,7 @@ def artist(*modules: str, fork: bool = False) -> Iterator[ProcessPoolExecutor]:
             Nothing but this thread may be at work here.
     """
     context = get_context("fork" if fork and sys.platform == "linux" else "spawn")
-    pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin)
+    pool = _Sealed(1, mp_context=context, initializer=_begin)
     try:
         with warnings.catch_warnings():
             # Python 3.12 and later warn of any thread, as those of NumPy that wait for work
@@ -35,6 +37,24 @@ def artist(*modules: str, fork: bool = False) -> Iterator[ProcessPoolExecutor]:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+class _Sealed(ProcessPoolExecutor):
+    """Sends copies of what a task is about, made at once.
+
+    PyTorch would move the memory of each tensor to where both processes see it, from a thread of
+    the pool and under the feet of who reads the tensor here meanwhile: a crash, now and then.
+    """
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return what will come of a call in the other process."""
+        return super().submit(_opened, pickle.dumps((fn, args, kwargs), pickle.HIGHEST_PROTOCOL))
+
+
+def _opened(sealed: bytes) -> Any:
+    """Return what comes of a call that was sealed by this program a moment ago."""
+    fn, args, kwargs = pickle.loads(sealed)  # noqa: S301
+    return fn(*args, **kwargs)
 
 
 def _begin() -> None:
