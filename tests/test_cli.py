@@ -23,7 +23,7 @@ from panoscene.cli import COMMANDS, main
 from panoscene.cli import _arrange as arrange_module
 from panoscene.cli import _demo as demo_module
 from panoscene.cli import _measure as measure_module
-from panoscene.scene import read_box_table, read_scene, scene_json_schema
+from panoscene.scene import SceneFormatError, read_box_table, read_scene, scene_json_schema
 from panoscene.views import DemoResult
 
 ROOM: dict[str, Any] = json.loads(Path(__file__).with_name("bedroom.json").read_text())
@@ -173,6 +173,43 @@ for arguments in (["--help"], ["arrange", "--help"], ["convert"]):
 assert not set(sys.modules) & {set(heavy)!r}
 """
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["arrange", "gone.json", "-o", "o"],
+        ["relations", "gone.json"],
+        ["convert", "gone.json", "-o", "o.glb"],
+        ["draw", "gone.json", "-o", "o"],
+        ["draw", "room.json", "-o", "o", "--truth", "gone.json"],
+        ["view", "gone.json"],
+    ],
+)
+def test_missing_scenes_are_told_before_libraries_are_loaded(
+    folder: Path, arguments: list[str]
+) -> None:
+    code = f"""
+import sys
+from panoscene.cli import main
+assert main({arguments!r}) == 2
+assert not set(sys.modules) & {{"torch", "numpy", "matplotlib"}}
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    with pytest.raises(SceneFormatError) as error:
+        read_scene(Path("gone.json"))
+    assert (done.stdout, done.stderr) == ("", f"error: {error.value}\n")
+
+
+def test_missing_scenes_are_told_as_json_too(folder: Path, run: Run) -> None:
+    code, out, err = run("arrange", "gone.json", "away.json", "-o", "o", "--json")
+    entries = json.loads(out)
+    assert (code, err.count("found nothing")) == (2, 2)
+    assert [(entry["scene"], entry["ok"]) for entry in entries] == [
+        ("gone.json", False),
+        ("away.json", False),
+    ]
+    assert all("found nothing" in entry["error"] for entry in entries)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

@@ -46,6 +46,15 @@ def test_an_error_of_the_program_is_shown() -> None:
     assert "ZeroDivisionError" in err
 
 
+def test_an_interrupt_while_it_starts_is_quiet(tmp_path: Path) -> None:
+    # as Ctrl-C in the first tenths of a second, while the option parser is imported
+    (tmp_path / "tyro.py").write_text("raise KeyboardInterrupt")
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from panoscene.cli import run; run()"
+    )
+    assert ended(code, "--version") == (130, "", "")
+
+
 def test_closed_streams_do_not_matter() -> None:
     code = "import sys; sys.stdout = sys.stderr = None; from panoscene.cli import run; run()"
     assert ended(code, "--version") == (0, "", "")

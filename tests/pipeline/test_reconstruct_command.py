@@ -14,6 +14,7 @@ from PIL import Image as Pillow
 
 from panoscene import pipeline as pipeline_package
 from panoscene.cli import main
+from panoscene.models import shipped_weights
 from panoscene.pipeline import Pipeline
 from panoscene.sample import sample_photo_path
 from panoscene.scene import read_scene
@@ -240,6 +241,34 @@ def test_missing_and_damaged_weights_are_refused(run: Run, photo: Path, tmp_path
     code, _, err = run(photo, "-o", tmp_path / "room", "--weights", weights)
     assert code == 2
     assert str(weights / "detector.safetensors") in err
+    assert not (tmp_path / "room").exists()
+
+
+@pytest.mark.parametrize("fault", ["missing", "cut off", "of zeros"])
+def test_bad_weights_are_told_before_libraries_are_loaded(
+    photo: Path, tmp_path: Path, fault: str
+) -> None:
+    weights = tmp_path / "weights"
+    weights.mkdir()
+    for stage in ("detector", "layout", "pose", "shape", "context"):
+        shutil.copy(shipped_weights(stage), weights / f"{stage}.safetensors")
+    last = weights / "context.safetensors"
+    data = last.read_bytes()
+    if fault == "missing":
+        last.unlink()
+    else:
+        last.write_bytes(data[:-1] if fault == "cut off" else bytes(len(data)))
+    arguments = ["reconstruct", str(photo), "-o", str(tmp_path / "room"), "--weights", str(weights)]
+    code = f"""
+import sys
+from panoscene.cli import main
+assert main({arguments!r}) == 2
+assert "torch" not in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stderr.startswith(f"error: {last}: found ")
+    assert done.stderr.endswith("expected a .safetensors file with weights of panoscene\n")
+    assert done.stderr.count("\n") == 1
     assert not (tmp_path / "room").exists()
 
 

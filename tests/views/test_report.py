@@ -19,8 +19,10 @@ from panoscene.geometry import OrientedBoxes
 from panoscene.sample import sample_room_path
 from panoscene.scene import Layout, Mesh, Scene, Shapes, read_scene
 from panoscene.synth import perturb_scene, sample_room
+from panoscene.views._pieces import View, make_plan
 from panoscene.views._report import FOLDER, write_report
 from panoscene.views._report_colours import PALETTES
+from panoscene.views._report_data import box_faults
 
 VOID = {"meta", "link", "img", "br", "input", "hr"}
 HOSTILE = "</script><img src=x onerror=alert(1)>&\u2028\"'"
@@ -167,6 +169,28 @@ def test_faults_are_named(tmp_path: Path) -> None:
     write_report(tmp_path / "report.html", crowded, tolerance=0.07)
     forgiving = Page((tmp_path / "report.html").read_text()).data["faults"]["after"]
     assert forgiving == [first, "overlaps a by 10 cm"]
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.1])
+def test_report_and_plan_agree_on_what_is_outside(tolerance: float) -> None:
+    told = 0
+    for seed in range(6):
+        scene = room(seed, 20, 8)
+        boxes, count = scene.objects.boxes, len(scene.objects.boxes)
+        aside = torch.from_numpy(np.random.default_rng(seed).normal(0.0, 0.6, (count, 3))).float()
+        # heights stay: a plan does not show who is in the floor
+        moved = replace(boxes, centre=boxes.centre + aside * torch.tensor([1.0, 1.0, 0.0]))
+        scene = replace(scene, objects=replace(scene.objects, boxes=moved))
+        assert scene.relations is not None
+        # the score says where something belongs, not where it is
+        nowhere = replace(scene.relations, inside_room=torch.zeros(count))
+        scene = replace(scene, relations=nowhere)
+        plan = make_plan(scene, View(0.0, 100.0), relations=False, tolerance=tolerance)
+        hatched = {piece.index for piece in plan.pieces if piece.outside.area > 0}
+        faults = box_faults(scene, tolerance)
+        assert hatched == {k for k, fault in enumerate(faults) if fault and "outside" in fault}
+        told += len(hatched)
+    assert 20 < told < 100
 
 
 def test_names_cannot_break_out(tmp_path: Path) -> None:

@@ -10,16 +10,14 @@ from panoscene.arrange import ArrangementSettings, Certificate, arrange_scenes
 from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import (
-    CERTIFICATE,
     beside,
     blaming,
-    scene_files,
-    scene_targets,
     write_scene_from,
     write_text,
     writing,
 )
 from panoscene.cli._progress import progress_bar
+from panoscene.cli._scene_files import CERTIFICATE, scene_files, scene_targets
 from panoscene.cli._tables import say_certificates
 from panoscene.cli._terminal import complain, json_text, say, say_json
 from panoscene.scene import Scene, SceneFormatError, read_scene

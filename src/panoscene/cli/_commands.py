@@ -87,6 +87,10 @@ def arrange(
         animation: Also show the boxes moving, in NAME.repair.webp; takes half a minute each.
         json: Print one list with everything instead of a table.
     """
+    from panoscene.cli._scene_files import all_gone
+
+    if all_gone(scenes, as_json=json):
+        return 2
     from panoscene.cli._arrange import Extras, arrange_files
     from panoscene.cli._settings import chosen_settings
 
@@ -127,6 +131,9 @@ def relations(
             to each other and to the walls; there are many of these. Files and --json have all.
         json: Print the graph of the relations as JSON: nodes and edges.
     """
+    from panoscene.cli._scene_files import check_scene
+
+    check_scene(scene)
     from panoscene.cli._relations import show_relations
 
     return show_relations(
@@ -190,6 +197,10 @@ def convert(
         size: Width of each face or view in pixels; without it as sharp as the panorama.
         photo: For .glb and .html: the panorama, instead of the one that the scene names.
     """
+    from panoscene.cli._scene_files import check_scene
+
+    if input.suffix.lower() == ".json":
+        check_scene(input)
     from panoscene.cli._convert import SceneOptions, convert_file
     from panoscene.cli._pictures import PanoramaOptions
 

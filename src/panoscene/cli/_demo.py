@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder
+from panoscene.cli._folders import check_folder
 from panoscene.cli._tables import say_before_after
 from panoscene.cli._terminal import say, say_json
 from panoscene.views import DemoResult, run_demo

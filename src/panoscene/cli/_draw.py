@@ -9,7 +9,8 @@ from torch import Tensor
 
 from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import blaming, check_folder, write_bytes, writing
+from panoscene.cli._files import blaming, write_bytes, writing
+from panoscene.cli._folders import check_folder
 from panoscene.cli._photos import photo_image
 from panoscene.cli._progress import progress_words
 from panoscene.cli._terminal import note

@@ -7,15 +7,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import (
-    blaming,
-    check_folder,
-    read_json_object,
-    scene_files,
-    write_text,
-)
+from panoscene.cli._files import blaming, read_json_object, write_text
+from panoscene.cli._folders import check_folder
 from panoscene.cli._progress import progress_bar, progress_words
+from panoscene.cli._scene_files import scene_files
 from panoscene.cli._terminal import note, say, say_json
+from panoscene.cli._weight_files import STAGES
 from panoscene.eval import (
     MANIFEST,
     METHODS,
@@ -95,10 +92,9 @@ def run_reconstruct(
         raise InputError(f"{data}: found no panoramas of {' and '.join(splits)}")
     pipeline = load(edition, weights=weights, shapes=shapes)
     # the relation graph network is told of shapes in any case
-    names = ("detector", "layout", "pose", "shape", "context")
     files = {
         name: shipped_weights(name) if weights is None else weights / f"{name}.safetensors"
-        for name in names
+        for name in STAGES
     }
     sources = {name: sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
     with progress_words() as progress, blaming("--output"):

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from panoscene._editions import Edition
 from panoscene.cli._options import (
     Count,
     Flag,
@@ -61,7 +62,7 @@ def reconstruct(
         tuple[Literal["train", "val", "test-seen", "test-unseen"], ...], arg(metavar="SPLIT")
     ] = ("test-seen", "test-unseen"),
     weights: OptionalFolder = None,
-    edition: Literal["compact", "paper"] = "compact",
+    edition: Edition = "compact",
     shapes: bool = False,
 ) -> int:
     """Write the true scenes of a rendered set and what the pipeline predicts from its photos.

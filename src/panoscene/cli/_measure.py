@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder, write_text
+from panoscene.cli._files import write_text
+from panoscene.cli._folders import check_folder
 from panoscene.cli._progress import progress_words
 from panoscene.cli._terminal import json_text, note, say, say_json
 from panoscene.eval import (

@@ -11,7 +11,8 @@ from PIL import Image
 from torch import Tensor
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder, write_bytes
+from panoscene.cli._files import write_bytes
+from panoscene.cli._folders import check_folder
 from panoscene.cli._kinds import PICTURES, check_kind
 from panoscene.geometry import (
     CUBE_FACES,

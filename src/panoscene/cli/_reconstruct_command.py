@@ -5,16 +5,17 @@
 import math
 import threading
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
+from panoscene._editions import Edition
 from panoscene.cli._artist import artist
 from panoscene.cli._errors import InputError
 from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFile, Output
 from panoscene.cli._synth_commands import Address
+from panoscene.cli._weight_files import check_weights
 
-Edition = Literal["compact", "paper"]
 _DRAWING = (
     "panoscene.cli._results",
     "matplotlib.backends.backend_agg",
@@ -89,6 +90,8 @@ def reconstruct(
         raise InputError(f"--weights {weights}: found no folder there")
     if steps is not None and steps < 0:
         raise InputError(f"--steps: found {steps}, expected 0 or more")
+    if weights is not None:
+        check_weights(weights)
     from panoscene.cli._reconstruct import Choice, photo_files, photo_folders, reconstruct_files
 
     if device != "cpu":

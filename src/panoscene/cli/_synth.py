@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder, writing
+from panoscene.cli._files import writing
+from panoscene.cli._folders import check_folder
 from panoscene.cli._progress import progress_words
 from panoscene.cli._synth_make import model_cache
 from panoscene.cli._synth_progress import steps_told

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from panoscene.cli._errors import InputError
-from panoscene.cli._files import check_folder
+from panoscene.cli._folders import check_folder
 from panoscene.cli._synth_glb import write_scene_glb
 from panoscene.cli._synth_progress import spoken, steps_told, stopping_at_once, told_in_words
 from panoscene.cli._tables import say_table

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from panoscene._editions import Edition
 from panoscene.cli._options import Flag, OptionalCount, OptionalFile, Output
 
 StageName = Annotated[
@@ -67,7 +68,7 @@ def precompute(
     data: Annotated[Positional[Path], arg(metavar="DIR")],
     *,
     output: Output,
-    edition: Literal["compact", "paper"] = "compact",
+    edition: Edition = "compact",
     detector: OptionalFile = None,
     layout: OptionalFile = None,
     only: Annotated[

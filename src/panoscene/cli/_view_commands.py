@@ -28,6 +28,10 @@ def draw(
         photo: The panorama, instead of the one that the scene names.
         truth: Another scene, whose boxes are outlined in grey.
     """
+    from panoscene.cli._scene_files import check_scene
+
+    for file in (scene,) if truth is None else (scene, truth):
+        check_scene(file)
     from panoscene.cli._draw import draw_file
 
     return draw_file(scene, output, photo, truth)
@@ -57,6 +61,9 @@ def view(
         port: Port to serve at; 0 takes any free one.
         photo: The panorama, instead of the one that the scene names.
     """
+    from panoscene.cli._scene_files import check_scene
+
+    check_scene(scene)
     from panoscene.cli._draw import serve_file
 
     return serve_file(scene, host=host, port=port, photo=photo, save_to=output)

@@ -1,12 +1,13 @@
 """The networks of the stages: what they are built of, and files with their weights."""
 
+from panoscene._editions import EDITIONS as EDITIONS
+from panoscene._editions import Edition as Edition
+
 from ._backbone import Backbone as Backbone
 from ._backbone import BackboneName as BackboneName
 from ._backbone import build_backbone as build_backbone
 from ._circular import CircularConv2d as CircularConv2d
 from ._circular import make_circular as make_circular
-from ._editions import EDITIONS as EDITIONS
-from ._editions import Edition as Edition
 from ._errors import CheckpointError as CheckpointError
 from ._imagenet import imagenet_weights as imagenet_weights
 from ._imagenet import read_tensors as read_tensors

@@ -12,9 +12,9 @@ from torch import Tensor, nn
 from torch.nn import init
 from torch.overrides import TorchFunctionMode
 
+from panoscene._editions import Edition
 from panoscene.scene import write_atomically
 
-from ._editions import Edition
 from ._errors import CheckpointError
 
 SCHEMA = 1

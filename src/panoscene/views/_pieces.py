@@ -144,7 +144,7 @@ def make_plan(scene: Scene, view: View, *, relations: bool, tolerance: float = T
     pairs = colliding_pairs(boxes, tolerance)
     colliding = set(pairs.flatten().tolist())
     grown = floor.buffer(tolerance * view.scale, join_style="mitre")
-    with_walls = floor.buffer(IN_WALL * view.scale, join_style="mitre")
+    with_walls = floor.buffer(max(tolerance, IN_WALL) * view.scale, join_style="mitre")
     categories = [CATEGORIES[k] for k in scene.objects.category.tolist()]
     bottom = (boxes.centre[:, 2] - boxes.size[:, 2] / 2 - scene.layout.floor_height).tolist()
     top = (boxes.centre[:, 2] + boxes.size[:, 2] / 2).tolist()

@@ -56,9 +56,9 @@ def report_data(
     related = Scene(scene.panorama, scene.layout, scene.objects, relations, scene.name)
     categories = [CATEGORIES[k] for k in scene.objects.category.tolist()]
     worn = {group_of(category) for category in categories}
-    faults = {"after": box_faults(scene, scene.relations, tolerance)}
+    faults = {"after": box_faults(scene, tolerance)}
     if before is not None:
-        faults["before"] = box_faults(before, scene.relations, tolerance)
+        faults["before"] = box_faults(before, tolerance)
     return {
         "camera_height": scene.panorama.camera_height,
         "layout": _layout(scene),
@@ -74,13 +74,11 @@ def report_data(
     }
 
 
-def box_faults(
-    scene: Scene, relations: Relations | None, tolerance: float = TOLERANCE
-) -> list[str | None]:
+def box_faults(scene: Scene, tolerance: float = TOLERANCE) -> list[str | None]:
     """Return what is physically wrong with each object, from some metres on, or None.
 
-    Objects that do not belong in the room by their inside_room score may be outside it, and doors
-    and windows in its walls.
+    Doors and windows may be in the walls. What is outside the room is told even where inside_room
+    says that it belongs there, as the pictures from above hatch it.
     """
     boxes, names = scene.objects.boxes, object_names(scene.objects)
     if len(boxes) == 0:
@@ -88,15 +86,15 @@ def box_faults(
     depth = penetration_depth(boxes[:, None], boxes[None, :]).fill_diagonal_(0.0)
     deepest, partner = depth.max(dim=1)
     outside = _distance_outside(boxes, scene.layout)
-    if relations is not None:
-        outside = outside * (relations.inside_room >= 0.5)
-    built_in = [CATEGORIES[k] in BUILT_IN for k in scene.objects.category.tolist()]
-    outside = outside - IN_WALL * outside.new_tensor(built_in)
+    allowed = [
+        max(tolerance, IN_WALL) if CATEGORIES[k] in BUILT_IN else tolerance
+        for k in scene.objects.category.tolist()
+    ]
     faults: list[str | None] = []
-    columns = zip(deepest.tolist(), partner.tolist(), outside.tolist(), strict=True)
-    for overlap, other, beyond in columns:
+    columns = zip(deepest.tolist(), partner.tolist(), outside.tolist(), allowed, strict=True)
+    for overlap, other, beyond, most in columns:
         parts = [f"overlaps {names[other]} by {100 * overlap:.0f} cm"] * (overlap > tolerance)
-        parts += [f"{100 * beyond:.0f} cm outside the room"] * (beyond > tolerance)
+        parts += [f"{100 * beyond:.0f} cm outside the room"] * (beyond > most)
         faults.append(", ".join(parts) or None)
     return faults
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from panoscene.models._editions import Edition
+from panoscene._editions import Edition
 
 Count = Annotated[int, Field(ge=1)]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import torch
 
-from panoscene.models._editions import Edition
+from panoscene._editions import Edition
 from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Objects, Relations
 

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from panoscene._editions import Edition
 from panoscene.models._backbone import BackboneName
-from panoscene.models._editions import Edition
 
 Seam = Literal["circular", "extend", "none"]
 """How objects at the left and right edge are seen whole. ``circular``: padding wraps around and

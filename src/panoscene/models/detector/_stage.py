@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from panoscene.models._editions import Edition
+from panoscene._editions import Edition
 from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Detections
 

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from panoscene.models._editions import Edition
+from panoscene._editions import Edition
 
 COLUMNS = 1024
 """Columns of the boundary and corner signals, whatever the size of the network's image."""

@@ -8,7 +8,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 
-from panoscene.models._editions import Edition
+from panoscene._editions import Edition
 from panoscene.models._weights import load_network, weights_file
 from panoscene.models.layout._config import CONFIGS
 from panoscene.models.layout._network import LayoutNetwork, build_layout

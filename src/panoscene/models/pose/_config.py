@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from panoscene._editions import Edition
 from panoscene.models._backbone import BackboneName
-from panoscene.models._editions import Edition
 
 Count = Annotated[int, Field(ge=1)]
 

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
 
+from panoscene._editions import Edition
 from panoscene.geometry import OrientedBoxes, decode_box_code, perspective_crop
-from panoscene.models._editions import Edition
 from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import CATEGORIES, Detections, Layout, Objects
 

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from panoscene._editions import Edition
 from panoscene.models._backbone import BackboneName
-from panoscene.models._editions import Edition
 
 ANALYTIC = 10
 """Numbers of an element that describe its Gaussian: constant, centre, radii, angles."""

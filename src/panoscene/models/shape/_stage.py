@@ -6,8 +6,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from panoscene._editions import Edition
 from panoscene.geometry import perspective_crop, view_relative_yaw
-from panoscene.models._editions import Edition
 from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh, built_in
 

@@ -1,4 +1,4 @@
-"""The two sizes in which every network comes."""
+"""The two sizes in which every network comes, for who does not wait for PyTorch, too."""
 
 from typing import Literal, get_args
 
