@@ -26,7 +26,7 @@ def whole_solid_angle(
     Args:
         vertices: Relative to the camera, in the frame of the directions.
         faces: Seen from both sides.
-        directions: Of the pixels, of unit length.
+        directions: Of the pixels, of unit length, row by row from the top.
         weight: Solid angles of the pixels.
         seen: Where it is known to be visible; these count without a ray.
     """
@@ -53,7 +53,7 @@ def points_seen_alone(
     Args:
         vertices: Relative to the camera, in the frame of the directions.
         faces: Seen from both sides.
-        directions: Of the pixels, of unit length.
+        directions: Of the pixels, of unit length, row by row from the top.
     """
     candidates = _may_meet(vertices, directions, np.ones(len(directions), np.bool_))
     rays = np.ascontiguousarray(directions[candidates])
@@ -78,11 +78,30 @@ def _may_meet(
     axis /= max(float(np.linalg.norm(axis)), 1e-9)
     narrowest = float((towards @ axis).min())
     if narrowest > 0.05:  # a cone of less than 87 degrees holds all vertices, and so all faces
-        limit = np.cos(min(np.arccos(narrowest) + _MARGIN, np.pi))
-        candidates = np.flatnonzero((directions @ axis.astype(np.float32) >= limit) & wanted)
+        reach = min(float(np.arccos(min(narrowest, 1.0))) + _MARGIN, np.pi)
+        first, last = _level_with(axis, reach, directions[:, 2])
+        near = directions[first:last] @ axis.astype(np.float32) >= np.cos(reach)
+        candidates = np.flatnonzero(near & wanted[first:last]) + first
     else:
         candidates = np.flatnonzero(wanted)
     return candidates[_meets_bounds(vertices, directions[candidates])]
+
+
+def _level_with(
+    axis: Float64[np.ndarray, " 3"], reach: float, height: Float32[np.ndarray, " n"]
+) -> tuple[int, int]:
+    """Return the first and one past the last direction that is as high as some of a cone.
+
+    Args:
+        axis: Of the cone, of unit length.
+        reach: Half the opening of the cone in radians.
+        height: Of the directions, falling.
+    """
+    middle = np.arccos(np.clip(axis[2], -1.0, 1.0))
+    high, low = np.cos(max(middle - reach, 0.0)), np.cos(min(middle + reach, np.pi))
+    # two searches in what rises
+    first, last = np.searchsorted(-height, (-high - 1e-6, -low + 1e-6))
+    return int(first), int(last)
 
 
 def _meets_bounds(

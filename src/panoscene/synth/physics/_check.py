@@ -5,7 +5,6 @@ from pathlib import Path
 from panoscene.synth.homes import Home
 
 from ._records import Fault, Models
-from ._rest import rest
 from ._scene import CARPET, Scene, scene_of
 from ._shapes import CollisionShape
 from ._walls import back_gap, outside
@@ -83,6 +82,4 @@ def gap_of(scene: Scene, index: int) -> float:
         return 1.0 if hung is None else max(hung[0], 0.0)
     if body.low <= 0.0:
         return 0.0
-    others = {key: other for key, other in scene.solids.items() if key != index}
-    found = rest(body, others, most_lift=0.0)
-    return max(-found.lift, 0.0)
+    return max(-scene.rest(index, (), most_lift=0.0).lift, 0.0)

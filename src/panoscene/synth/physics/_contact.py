@@ -50,17 +50,31 @@ def blocked_moves(
         frame: Orthonormal rows; the moves are along the last one.
         reach: Only moves up to this length are of interest.
     """
+    columns = shared_columns(first, second, frame, reach)
+    return np.zeros((0, 2)) if columns is None else blocked_on(first, second, frame, columns)
+
+
+def shared_columns(
+    first: Solid, second: Solid, frame: Float64[np.ndarray, "3 3"], reach: float
+) -> Columns | None:
+    """Return the lines that may cut both meshes; None where no move up to a length joins them."""
     shared = []
     for row in frame[:2]:
         a_span, b_span = first.span(row), second.span(row)
         shared.append((max(a_span[0], b_span[0]), min(a_span[1], b_span[1])))
         if shared[-1][1] <= shared[-1][0]:  # nearly all pairs end here
-            return np.zeros((0, 2))
+            return None
     low, high = np.array(shared).T
     a_span, b_span = first.span(frame[2]), second.span(frame[2])
     if b_span[0] - a_span[1] > reach or a_span[0] - b_span[1] > reach:
-        return np.zeros((0, 2))
-    columns = columns_over(low, high)
+        return None
+    return columns_over(low, high)
+
+
+def blocked_on(
+    first: Solid, second: Solid, frame: Float64[np.ndarray, "3 3"], columns: Columns
+) -> Intervals:
+    """Return the moves of ``blocked_moves``, however long, as some lines tell them."""
     a_cell, a_part = _solid_parts(first, frame, columns)
     b_cell, b_part = _solid_parts(second, frame, columns)
     start = np.searchsorted(b_cell, a_cell, side="left")

@@ -7,7 +7,6 @@ from jaxtyping import Float64
 
 from ._check import TOLERANCE, beyond
 from ._contact import overlap
-from ._rest import rest
 from ._scene import Scene
 from ._walls import outside
 
@@ -100,9 +99,7 @@ def _try_shift(
     good = True
     for k in group:
         if scene.freedom[k] != "sliding":
-            above = {k, *scene.dependents(k)}
-            others = {j: other for j, other in scene.solids.items() if j not in above}
-            found = rest(scene.solids[k], others, most_lift=_STEP_UP)
+            found = scene.rest(k, scene.dependents(k), _STEP_UP)
             good &= found.free and found.lift > -_STEP_UP
             if good:
                 scene.put(k, scene.solids[k].shifted(np.array([0.0, 0.0, found.lift])))

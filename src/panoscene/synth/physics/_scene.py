@@ -1,6 +1,6 @@
 """The furniture of one room while it is settled or checked."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,9 +10,10 @@ from jaxtyping import Float64
 from panoscene.synth.assets import CadModel
 from panoscene.synth.homes import Home, Placed, Room
 
-from ._contact import Overlap, overlap
+from ._contact import Intervals, Overlap, overlap
 from ._engine import Body, Freedom
 from ._records import Models
+from ._rest import MOST_LIFT, Falls, Rest, rest
 from ._shapes import CollisionShape, collision_shape
 from ._solids import Solid, solid
 
@@ -55,6 +56,7 @@ class Scene:
     freedom: dict[int, Freedom]
     support: dict[int, int | None]
     _known: dict[tuple[int, int], Overlap] = field(default_factory=dict)
+    _falls: Falls = field(default_factory=Falls)
 
     def dependents(self, index: int) -> tuple[int, ...]:
         """Return what stands on a model, directly or not, lowest first."""
@@ -102,6 +104,22 @@ class Scene:
         if pair not in self._known:
             self._known[pair] = overlap(self.solids[first], self.solids[second])
         return self._known[pair]
+
+    def rest(self, index: int, without: Collection[int], most_lift: float = MOST_LIFT) -> Rest:
+        """Return where a model comes to rest when it only moves up or down.
+
+        Args:
+            index: Of the model.
+            without: What it cannot rest on, besides itself.
+            most_lift: Longest way up that is tried.
+        """
+        body = self.solids[index]
+        others = {k: v for k, v in self.solids.items() if k != index and k not in without}
+
+        def blocked(key: int, other: Solid, reach: float) -> Intervals:
+            return self._falls.blocked((index, key), body, other, reach)
+
+        return rest(body, others, most_lift=most_lift, blocked=blocked)
 
     def pairs(self, only: tuple[int, ...] | None = None) -> Iterator[tuple[int, int]]:
         """Return pairs of models whose bounds overlap, the lower index first.

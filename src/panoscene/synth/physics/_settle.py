@@ -160,7 +160,7 @@ def _lay_down(scene: Scene, notes: _Notes, farthest: float) -> None:
             continue
         above = {index, *scene.dependents(index)}
         others = {k: other for k, other in scene.solids.items() if k not in above}
-        found = rest(body, others)
+        found = scene.rest(index, above)
         scene.put(index, body.shifted(np.array([0.0, 0.0, found.lift])))
         if not found.free:
             below = scene.support[index]
@@ -208,9 +208,7 @@ def _accept(
         scene.place(index, body.position + move, body.yaw if still else motion.yaw)
         if scene.freedom[index] == "sliding":
             continue
-        waiting = set(order[place:])
-        others = {k: other for k, other in scene.solids.items() if k not in waiting}
-        found = rest(scene.solids[index], others)
+        found = scene.rest(index, order[place:])
         if not found.free or found.lift < -_FELL:
             gone = "lost what it stood on" if found.free else "no room for it where it came to rest"
             _drop_out(scene, notes, index, gone)
