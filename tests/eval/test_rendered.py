@@ -16,7 +16,7 @@ from panoscene.eval import ROWS, export_reconstructions, match_objects
 from panoscene.eval._rendered import SHAPED, predicted_rows
 from panoscene.exports import write_glb
 from panoscene.models.layout import LayoutPrediction
-from panoscene.pipeline import Pipeline, Stages
+from panoscene.pipeline import Clock, Pipeline, Stages
 from panoscene.scene import (
     Detections,
     Layout,
@@ -63,7 +63,13 @@ class NearlyKnowing:
         return select_objects(self.truth.objects, torch.arange(len(detections.category)))
 
     def context(
-        self, image: Image, detections: Detections, layout: Layout, camera_height: float
+        self,
+        image: Image,
+        detections: Detections,
+        layout: Layout,
+        camera_height: float,
+        *,
+        clock: Clock,
     ) -> tuple[Objects, Relations | None]:
         objects = self.pose(image, detections, layout, camera_height)
         moved = objects.boxes.centre + torch.tensor([SHIFT, 0.0, 0.0])

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from panoscene.pipeline import Given, Pipeline
+from panoscene.pipeline import Clock, Given, Pipeline, load_stages
 from panoscene.scene import Detections, Layout, Objects, Relations, Scene, relations_from_boxes
 
 from .conftest import Knowing
@@ -24,7 +24,13 @@ class Context:
         self.height = 0.0
 
     def __call__(
-        self, image: Image, detections: Detections, layout: Layout, camera_height: float
+        self,
+        image: Image,
+        detections: Detections,
+        layout: Layout,
+        camera_height: float,
+        *,
+        clock: Clock,
     ) -> tuple[Objects, Relations | None]:
         self.height = camera_height
         boxes = self.truth.objects.boxes
@@ -80,3 +86,11 @@ def test_stages_and_settings_can_be_used_for_another_pipeline(knowing: Knowing) 
     pipeline = Pipeline(stages, settings="released")
     assert pipeline.stages is stages
     assert pipeline.settings == "released"
+
+
+def test_its_parts_are_timed(truth: Scene, image: Tensor) -> None:
+    stages = load_stages(shapes=False)
+    result = Pipeline(stages)(image, truth.panorama)
+    timed = ["upright", "detector", "layout", "pose", "codes", "context", "arrangement"]
+    assert list(result.timings) == timed
+    assert all(seconds > 0 for seconds in result.timings.values())

@@ -1,5 +1,6 @@
 """From a photo to a scene: the stages in order, each of which can be given or left out."""
 
+from ._clock import Clock as Clock
 from ._load import load as load
 from ._load import load_stages as load_stages
 from ._load import load_steps as load_steps

@@ -9,6 +9,8 @@ from panoscene.models.pose import PoseStage
 from panoscene.models.shape import ShapeStage, analytic_code, blob_centres
 from panoscene.scene import Detections, Layout, Objects, Relations
 
+from ._clock import Clock
+
 
 class ContextReader:
     """Refines the pose network's boxes, and says how objects and walls are related.
@@ -31,6 +33,8 @@ class ContextReader:
         detections: Detections,
         layout: Layout,
         camera_height: float,
+        *,
+        clock: Clock | None = None,
     ) -> tuple[Objects, Relations | None]:
         """Return one object for each detection, in their order, and relations if it knows any.
 
@@ -39,10 +43,11 @@ class ContextReader:
             detections: Where the objects are and what they are.
             layout: The room.
             camera_height: Metres above the floor.
+            clock: Told of the seconds for ``pose`` and ``codes``.
 
         Source: paper, Sec. 3.2.
         """
-        estimates = self.estimates(image, detections, layout, camera_height)
+        estimates = self.estimates(image, detections, layout, camera_height, clock=clock)
         return self.context(estimates)[0]
 
     @torch.inference_mode()
@@ -52,6 +57,8 @@ class ContextReader:
         detections: Detections,
         layout: Layout,
         camera_height: float,
+        *,
+        clock: Clock | None = None,
     ) -> Estimates:
         """Return what the relation graph network is told, a batch of one scene.
 
@@ -60,17 +67,21 @@ class ContextReader:
             detections: As in a call.
             layout: As in a call.
             camera_height: As in a call.
+            clock: As in a call.
         """
+        clock = clock or Clock()
         pose = self.pose
-        encoded = pose.encoded(image, detections)
-        output = pose.output(encoded, detections, layout, camera_height)
+        with clock("pose"):
+            encoded = pose.encoded(image, detections)
+            output = pose.output(encoded, detections, layout, camera_height)
         mean_size = pose.network.mean_size[detections.category.to(encoded.device)]
         code = encoded.new_zeros(len(encoded), 0)
         blobs = encoded.new_zeros(len(encoded), 0, 3)
         if self.shape is not None:
             objects = pose.decoded(output, detections, camera_height)
             config = self.shape.network.config
-            code = analytic_code(self.shape.codes(image, objects), config).to(encoded)
+            with clock("codes"):
+                code = analytic_code(self.shape.codes(image, objects), config).to(encoded)
             size = (output.size_residual[0] + 1) * mean_size
             blobs = blob_centres(code, size, config)
         polygon = layout.floor_polygon.to(encoded)

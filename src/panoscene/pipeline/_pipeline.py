@@ -1,10 +1,7 @@
 """The one path from a panorama to a scene."""
 
 import math
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import torch
 from jaxtyping import Float
@@ -22,6 +19,7 @@ from panoscene.scene import (
     upright_photo,
 )
 
+from ._clock import Clock
 from ._doubles import without_doubles
 from ._flags import photo_flags, scene_flags
 from ._records import Given, Reconstruction
@@ -107,7 +105,7 @@ class Pipeline:
             given: as in a call.
             name: as in a call.
         """
-        clock = _Clock()
+        clock = Clock()
         given = given or Given()
         panorama = panorama or Panorama(image.shape[-1], image.shape[-2])
         with clock("upright"):
@@ -119,8 +117,8 @@ class Pipeline:
         read, layout = self._read_layout(seen, panorama, given, clock)
         objects, relations = given.objects, None
         if objects is None:
-            with clock("pose" if self._stages.context is None else "context"):
-                objects, relations = self._placed(seen, found, layout, panorama.camera_height)
+            height = panorama.camera_height
+            objects, relations = self._placed(seen, found, layout, height, clock)
         initial = Scene(panorama, layout, objects, given.relations or relations, name)
         if given.objects is None and given.detections is None and given.relations is None:
             initial = without_doubles(initial)
@@ -138,7 +136,7 @@ class Pipeline:
         objects = placed.scene.objects
         if self._stages.shape is None or objects.shapes.mesh:
             return placed
-        clock = _Clock()
+        clock = Clock()
         with clock("shape"):
             shapes = self._stages.shape(placed.image, objects, resolution=resolution)
         scene = replace(placed.scene, objects=replace(objects, shapes=shapes))
@@ -160,7 +158,7 @@ class Pipeline:
         return turned, estimate.tilt
 
     def _detected(
-        self, image: Float[Tensor, "3 height width"], given: Given, clock: "_Clock"
+        self, image: Float[Tensor, "3 height width"], given: Given, clock: Clock
     ) -> Detections:
         if given.objects is not None:
             objects = given.objects
@@ -175,7 +173,7 @@ class Pipeline:
         image: Float[Tensor, "3 height width"],
         panorama: Panorama,
         given: Given,
-        clock: "_Clock",
+        clock: Clock,
     ) -> tuple[LayoutPrediction | None, Layout]:
         if given.layout is not None:
             return None, given.layout
@@ -189,13 +187,16 @@ class Pipeline:
         found: Detections,
         layout: Layout,
         camera_height: float,
+        clock: Clock,
     ) -> tuple[Objects, Relations | None]:
         """Return boxes, and relations where a stage says more than what follows from the boxes."""
         if self._stages.context is None:
-            return self._stages.pose(image, found, layout, camera_height), None
-        return self._stages.context(image, found, layout, camera_height)
+            with clock("pose"):
+                return self._stages.pose(image, found, layout, camera_height), None
+        with clock("context"):
+            return self._stages.context(image, found, layout, camera_height, clock=clock)
 
-    def _arranged(self, scene: Scene, clock: "_Clock") -> tuple[Scene, Certificate | None]:
+    def _arranged(self, scene: Scene, clock: Clock) -> tuple[Scene, Certificate | None]:
         """Return the arranged scene with relations that fit its boxes."""
         said, certificate = scene.relations, None
         with clock("arrangement"):
@@ -204,19 +205,6 @@ class Pipeline:
                 arrangement = arrange(start, self._settings)
                 scene, certificate = arrangement.scene, arrangement.certificate
             return replace(scene, relations=final_relations(scene, said)), certificate
-
-
-@dataclass(slots=True)
-class _Clock:
-    """Seconds for each part of the work."""
-
-    seconds: dict[str, float] = field(default_factory=dict[str, float])
-
-    @contextmanager
-    def __call__(self, part: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.seconds[part] = time.perf_counter() - start
 
 
 def _reduced(image: Float[Tensor, "3 height width"]) -> Float[Tensor, "3 rows columns"]:

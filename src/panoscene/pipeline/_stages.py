@@ -10,6 +10,8 @@ from panoscene.models.layout import LayoutPrediction
 from panoscene.models.upright import UprightEstimate
 from panoscene.scene import Detections, Layout, Objects, Relations, Shapes
 
+from ._clock import Clock
+
 
 @runtime_checkable
 class Leveller(Protocol):
@@ -65,8 +67,13 @@ class ContextEstimator(Protocol):
         detections: Detections,
         layout: Layout,
         camera_height: float,
+        *,
+        clock: Clock,
     ) -> tuple[Objects, Relations | None]:
-        """Return an oriented box for each detection, in their order, and relations if it can."""
+        """Return an oriented box for each detection, in their order, and relations if it can.
+
+        ``clock`` is for who consists of parts, to tell how long each takes.
+        """
         ...
 
 
