@@ -77,6 +77,7 @@ def test_limits_cut_the_last_home():
     [
         ("cameras: 0", "cameras"),
         ("camera: 5", "camera: Extra"),
+        ("furniture_texture: 300", "furniture_texture: Input should be 64, 128, 256"),
         ("homes: {train: 0, val: 0, test-seen: 0, test-unseen: 0}", "found none"),
         ("a: [", "expected YAML"),
         ("- 1", "the file"),

@@ -5,10 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from panoscene.synth.assets import AssetError
+from panoscene.synth.assets import AssetError, add_models
 from panoscene.synth.dataset import DatasetError, Recipe, read_index
-from panoscene.synth.production import RenderProgress, RenderTask, begin_run, follow, render_dataset
+from panoscene.synth.models import make_model
+from panoscene.synth.production import (
+    Models,
+    RenderProgress,
+    RenderTask,
+    begin_run,
+    follow,
+    render_dataset,
+)
+from panoscene.synth.production import _photographs as photographs_module
 from panoscene.synth.production import _run as run_module
+from panoscene.synth.render import Renderer
 
 Copy = Callable[[RenderTask], None]
 
@@ -113,6 +123,29 @@ def test_another_recipe_or_no_models_are_refused(
     with pytest.raises(AssetError):
         begin_run(tmp_path / "new", recipe, tmp_path / "none", limit=None, extra=None, threads=1)
     assert not (tmp_path / "new").exists()
+
+
+def test_furniture_has_textures_of_the_size_that_the_recipe_wants(
+    tmp_path: Path, recipe: Recipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_models(tmp_path / "cache", [make_model("cushion", 0, 0)])
+    found: list[int] = []
+
+    def furnished(seed: int, models: Models, *_: object, texture_size: int, **__: object) -> None:
+        textures = [material.texture for material in models["parametric/cushion/0"].materials]
+        edges = {picture.shape[0] for picture in textures if picture is not None}
+        assert edges == {texture_size}
+        found.append(texture_size)
+        raise ValueError("enough")
+
+    monkeypatch.setattr(photographs_module, "furnished_home", furnished)
+    blind = Renderer.__new__(Renderer)  # needs no engine
+    monkeypatch.setattr(run_module, "_renderer", lambda _: blind)
+    for size in (64, 128):
+        wanted = recipe.model_copy(update={"furniture_texture": size})
+        done = render_dataset(tmp_path / str(size), wanted, tmp_path / "cache", processes=1)
+        assert done.failed[0] == ("home0000", "enough")
+    assert found == [64] * 4 + [128] * 4
 
 
 def test_time_left_follows_this_run() -> None:

@@ -1,7 +1,7 @@
 """What a data set will be: homes, splits, cameras and their seeds, all fixed beforehand."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -43,6 +43,9 @@ class Recipe(Format):
     """Light paths through each pixel; half as many near the poles."""
     depth: Annotated[int, Field(ge=1)] = 6
     """Surfaces that a path meets at most."""
+    furniture_texture: Literal[64, 128, 256, 512, 1024, 2048, 4096] = 256
+    """Edge of the textures of furniture in pixels; larger ones are sharper, and take more time and
+    memory. Labels do not depend on it."""
     varied_cameras: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     """Share of the training homes with camera heights of 1.2 to 1.9 m and tilts up to 5 degrees;
     all others have 1.6 m and none."""

@@ -94,6 +94,7 @@ def run_synth_benchmark(
         "width": chosen.width,
         "samples": chosen.samples,
         "depth": chosen.depth,
+        "furniture_texture": chosen.furniture_texture,
     }
 
 

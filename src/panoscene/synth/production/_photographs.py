@@ -10,6 +10,7 @@ from panoscene.synth.dataset import (
     DatasetIndex,
     FileChoice,
     HomeJob,
+    Recipe,
     label_panorama,
     write_panorama,
 )
@@ -51,7 +52,7 @@ def photograph_home(
     Args:
         job: The home and the cameras that are missing.
         index: Of the data set.
-        models: To furnish the home with.
+        models: To furnish the home with, their textures as large as the recipe wants.
         renderer: Of this process.
         root: Folder of the data set.
         extra: Writes further files.
@@ -61,7 +62,7 @@ def photograph_home(
         ValueError: No place for a camera was found in any furnishing of the home.
     """
     recipe = index.recipe
-    furnished, scene, cameras = _prepared(job, recipe.cameras, recipe.width, models)
+    furnished, scene, cameras = _prepared(job, recipe, models)
     numbers = {f"{job.home}-{k}": k for k in range(recipe.cameras)}
     files = FileChoice(recipe.jpeg_quality, recipe.normals, recipe.albedo)
     lit = None
@@ -87,12 +88,15 @@ def photograph_home(
 
 
 def _prepared(
-    job: HomeJob, count: int, width: int, models: Models
+    job: HomeJob, recipe: Recipe, models: Models
 ) -> tuple[FurnishedHome, RenderScene, tuple[Camera, ...]]:
     """Return the home with enough free floor for its cameras."""
     part = "unseen" if job.split == "test-unseen" else "seen"
+    count, width = recipe.cameras, recipe.width
     for attempt in range(_ATTEMPTS):
-        furnished = furnished_home(job.seed, models, part, attempt=attempt)
+        furnished = furnished_home(
+            job.seed, models, part, attempt=attempt, texture_size=recipe.furniture_texture
+        )
         rng = np.random.default_rng([job.seed, 6])
         finishes = sample_finishes(furnished.home, rng)
         scene = scene_from_home(furnished.home, furnished.drawn, finishes, poses=furnished.poses)

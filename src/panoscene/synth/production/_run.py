@@ -154,13 +154,14 @@ def follow(
 
 def render_home(task: RenderTask) -> None:
     """Render one home in this process; models and renderer are kept for the next one."""
-    models, renderer = _models(task.cache), _renderer(task.threads)
+    models = _models(task.cache, task.index.recipe.furniture_texture)
+    renderer = _renderer(task.threads)
     photograph_home(task.job, task.index, models, renderer, task.root, extra=task.extra)
 
 
 @lru_cache(maxsize=1)
-def _models(cache: Path) -> Models:
-    return Models(cache)
+def _models(cache: Path, texture_size: int) -> Models:
+    return Models(cache, texture_size)
 
 
 @lru_cache(maxsize=1)
