@@ -11,7 +11,7 @@ from torch import Tensor
 
 from panoscene.arrange._batch import ArrangementBatch, collate_scenes
 from panoscene.arrange._certificate import SLACK, Certificate, Measures, find_faults, measure
-from panoscene.arrange._energy import energy_terms
+from panoscene.arrange._energy import energy_of_boxes, energy_terms
 from panoscene.arrange._holding import hold_back
 from panoscene.arrange._kernel import Kernel, make_kernel
 from panoscene.arrange._problem import (
@@ -159,8 +159,9 @@ def energy(
         weights: lambda of every term, instead of the settings'.
     """
     problem = make_problem(batch, settings, weights)
-    x = problem.start if boxes is None else variables_from_boxes(boxes, problem)
-    return energy_terms(x, problem)
+    if boxes is None:
+        return energy_terms(problem.start, problem)
+    return energy_of_boxes(boxes, problem)
 
 
 def solver_states(
@@ -212,7 +213,7 @@ def _like(boxes: OrientedBoxes, scene: Scene) -> OrientedBoxes:
 
 def _measure(variables: Tensor, problem: Problem) -> Measures:
     boxes = boxes_from_variables(variables, problem)
-    return measure(find_faults(boxes, problem.batch), energy_terms(variables, problem))
+    return measure(find_faults(boxes, problem.batch), energy_of_boxes(boxes, problem))
 
 
 def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
@@ -226,7 +227,7 @@ def _measure_all(states: list[Tensor], problem: Problem) -> list[Measures]:
         torch.cat([given.size, decoded.size[count:]]),
         torch.cat([given.yaw, decoded.yaw[count:]]),
     )
-    energies = energy_terms(variables, together, boxes)
+    energies = energy_of_boxes(boxes, together)
     return measure(find_faults(boxes, together.batch), energies).split(1 + len(states))
 
 

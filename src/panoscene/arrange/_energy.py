@@ -5,7 +5,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from panoscene.arrange import _terms as terms
-from panoscene.arrange._problem import Problem, boxes_from_variables
+from panoscene.arrange._problem import Problem, boxes_from_variables, variables_from_boxes
 from panoscene.arrange._settings import TERM_NAMES
 from panoscene.geometry import OrientedBoxes
 
@@ -31,6 +31,15 @@ def energy_terms(
         for name in TERM_NAMES
     ]
     return torch.stack(rows, -1)
+
+
+def energy_of_boxes(boxes: OrientedBoxes, problem: Problem) -> Float[Tensor, "scenes terms"]:
+    """Return the terms of ``energy_terms`` for boxes of batch shape (scenes, n).
+
+    Rounding in the descent's variables can hide what the boxes show: straight under the camera a
+    hair's breadth is half a turn.
+    """
+    return energy_terms(variables_from_boxes(boxes, problem), problem, boxes)
 
 
 def _huber(error: Tensor, beta: float) -> Tensor:

@@ -12,7 +12,7 @@ from panoscene.arrange._certificate import (
     find_faults,
     measure,
 )
-from panoscene.arrange._energy import energy_terms
+from panoscene.arrange._energy import energy_of_boxes
 from panoscene.arrange._problem import Problem, boxes_from_variables
 
 _ROUNDS = 24
@@ -40,7 +40,7 @@ def hold_back(
     for _ in range(_ROUNDS):
         boxes = boxes_from_variables(held, problem)
         faults = find_faults(boxes, problem.batch)
-        after = measure(faults, energy_terms(held, problem, boxes))
+        after = measure(faults, energy_of_boxes(boxes, problem))
         worse = ~after.acceptable(before)
         if not bool(worse.any()):
             break
