@@ -135,7 +135,7 @@ def red_at(picture: np.ndarray) -> tuple[float, float]:
 def test_matplotlib_has_nothing_to_say_at_its_first_use(tmp_path: Path) -> None:
     # it cannot keep its cache where a file is in the way, and would remark on that
     (tmp_path / "file").write_text("")
-    code = "from panoscene.cli import main; main(['--version']); import panoscene.views"
+    code = "from panoscene.cli import main; main(['--version']); import matplotlib.font_manager"
     result = subprocess.run(
         [sys.executable, "-c", code],
         env=os.environ | {"MPLCONFIGDIR": str(tmp_path / "file" / "folder")},

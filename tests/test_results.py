@@ -28,6 +28,7 @@ def test_the_pages_of_results_are_up_to_date(root: Path) -> None:
     assert main([*arguments, "--timings", timings, "--check"]) == 0
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_the_code_still_gives_the_committed_scores(root: Path, tmp_path: Path) -> None:
     """Two rooms stand for all: rooms and errors depend on seed and number only.
 

@@ -50,6 +50,7 @@ def test_boxes_carry_gradients_to_everything(preset: str):
 
 
 @pytest.mark.parametrize("preset", ["released", "default"])
+@pytest.mark.usefixtures("unchecked")
 def test_gradient_is_that_of_finite_differences(preset: str):
     batch = random_batch(scenes=1, n=3, seed=8)
     settings = short(preset, steps=5)
@@ -79,6 +80,7 @@ def floating_table() -> ArrangementBatch:
     return collate_scenes([scene_from_boxes(objects, room)])
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_a_relation_score_is_trained_through_the_optimiser():
     """Only the optimised box is supervised; the score learns that it stands on the floor."""
     batch = floating_table()

@@ -96,6 +96,7 @@ def test_benchmark_table_names_what_was_measured():
     assert "10: 0.50" in table
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_safety_counts_and_words():
     result = run_arrange_safety(scenes=12, seed=4)
     assert result["worse"] == 0

@@ -105,6 +105,7 @@ def test_a_category_that_is_not_drawn_keeps_its_area() -> None:
     assert (known == np.isnan(whole.average_precision).sum(axis=-1)).all()
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_intervals_of_mean_ap_are_central_and_cover() -> None:
     truth = score_detection(simulated(np.random.default_rng(9), 4000)).mean_average_precision()[0]
     rng = np.random.default_rng(1)

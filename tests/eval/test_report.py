@@ -1,6 +1,7 @@
 """Pages of results: which rows and tables they have, and that they say what is missing."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -133,6 +134,18 @@ def test_seconds_stand_beside_the_papers(tmp_path: Path) -> None:
     file.write_text(json.dumps(TIMINGS))
     assert main([*command, "--timings", str(file)]) == 0
     assert "## Time" in (tmp_path / "page.md").read_text()
+
+
+def test_the_seconds_of_all_parts_are_the_whole(root: Path) -> None:
+    measured = json.loads((root / "benchmarks" / "pipeline.json").read_text())
+    page = part(results_page([scores("a")], measured), "Time")
+    told = [float(row.split("|")[2]) for row in page.splitlines() if re.match(r"\| .*\d", row)]
+    *parts, whole, command = told
+    assert (whole, command) == pytest.approx(
+        (measured["total_s"], measured["cold_start_s"]), abs=0.01
+    )
+    # medians of each do not add up exactly
+    assert sum(parts) == pytest.approx(whole, rel=0.15)
 
 
 def test_meshes_have_tables_when_they_were_measured_and_a_sentence_when_not() -> None:

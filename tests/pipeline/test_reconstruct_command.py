@@ -1,10 +1,14 @@
 """panoscene reconstruct: what it writes, what it refuses, and how it goes on."""
 
+import io
 import json
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +17,12 @@ import torch
 from PIL import Image as Pillow
 
 from panoscene import pipeline as pipeline_package
+from panoscene.cli import _reconstruct_command as command_module
 from panoscene.cli import main
 from panoscene.models import shipped_weights
 from panoscene.pipeline import Pipeline
 from panoscene.sample import sample_photo_path
-from panoscene.scene import read_scene
+from panoscene.scene import Scene, read_scene
 
 from .conftest import Knowing
 
@@ -36,17 +41,22 @@ FILES = {
 Run = Callable[..., tuple[int, str, str]]
 
 
-@pytest.fixture
-def loaded(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Put stages that know the truth in the place of networks; gives the options of the load."""
+def put_in_place_of_networks(knowing: Knowing, patch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Let stages that know the truth be loaded; gives the options of the load."""
     options: dict[str, Any] = {}
 
     def load(edition: str, **others: Any) -> Pipeline:
         options.update(others, edition=edition)
         return Pipeline(knowing.stages(shape=None), settings=others["settings"])
 
-    monkeypatch.setattr(pipeline_package, "load", load)
+    patch.setattr(pipeline_package, "load", load)
     return options
+
+
+@pytest.fixture
+def loaded(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Put stages that know the truth in the place of networks; gives the options of the load."""
+    return put_in_place_of_networks(knowing, monkeypatch)
 
 
 @pytest.fixture
@@ -62,34 +72,69 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 @pytest.fixture
-def photo(tmp_path: Path) -> Path:
-    """A small photo."""
-    file = tmp_path / "flat.jpg"
+def drawn_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw in this process: another one would load the libraries again."""
+
+    def artist(*_: str, fork: bool) -> ThreadPoolExecutor:
+        del fork
+        return ThreadPoolExecutor(max_workers=1)
+
+    monkeypatch.setattr(command_module, "artist", artist)
+
+
+def small_photo(file: Path) -> Path:
+    """Write the sample photo, small."""
     with Pillow.open(sample_photo_path()) as picture:
         picture.resize((128, 64)).save(file)
     return file
 
 
-def test_one_photo_becomes_a_folder_of_results(
-    loaded: dict[str, Any], run: Run, photo: Path, tmp_path: Path
-) -> None:
-    code, out, err = run(photo, "-o", tmp_path / "room", "--camera-height", 1.4, "--steps", 0)
+@pytest.fixture
+def photo(tmp_path: Path) -> Path:
+    return small_photo(tmp_path / "flat.jpg")
+
+
+@dataclass(frozen=True)
+class Made:
+    """What the command made of a photo, and said."""
+
+    photo: Path
+    folder: Path
+    said: tuple[int, str, str]
+    loaded: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def made(truth: Scene, tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """The results of one photo, not to be changed."""
+    folder = tmp_path_factory.mktemp("made")
+    photo, room = small_photo(folder / "flat.jpg"), folder / "room"
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        options = put_in_place_of_networks(Knowing(truth), patch)
+        arguments = ["reconstruct", str(photo), "-o", str(room)]
+        code = main([*arguments, "--camera-height", "1.4", "--steps", "0"])
+    return Made(photo, room, (code, out.getvalue(), err.getvalue()), options)
+
+
+def test_one_photo_becomes_a_folder_of_results(made: Made) -> None:
+    code, out, err = made.said
     assert (code, err) == (0, "")
-    assert {file.name for file in (tmp_path / "room").iterdir()} == FILES
-    scene = read_scene(tmp_path / "room" / "scene.json")
+    assert {file.name for file in made.folder.iterdir()} == FILES
+    scene = read_scene(made.folder / "scene.json")
     assert scene.name == "flat"
     assert scene.panorama.camera_height == 1.4
     assert scene.panorama.file == "../flat.jpg"
     assert scene.relations is not None
     assert "17 objects: " in out
     assert "1 bed" in out
-    assert loaded["settings"] is None
-    assert loaded["level"] is True
-    account = json.loads((tmp_path / "room" / "reconstruction.json").read_text())
+    assert made.loaded["settings"] is None
+    assert made.loaded["level"] is True
+    account = json.loads((made.folder / "reconstruction.json").read_text())
     assert set(account["timings"]) == {"upright", "detector", "layout", "pose", "arrangement"}
 
 
-@pytest.mark.usefixtures("loaded")
+@pytest.mark.usefixtures("loaded", "drawn_here")
 def test_a_bad_photo_does_not_stop_the_others(run: Run, photo: Path, tmp_path: Path) -> None:
     (tmp_path / "photos").mkdir()
     shutil.copy(photo, tmp_path / "photos" / "good.jpg")
@@ -109,21 +154,19 @@ def test_a_bad_photo_does_not_stop_the_others(run: Run, photo: Path, tmp_path: P
 def test_what_is_wrong_is_told_before_torch_is_loaded(photo: Path, tmp_path: Path) -> None:
     (tmp_path / "cut.jpg").write_bytes(photo.read_bytes()[:500])
     wrong = (["nowhere.jpg"], [tmp_path / "cut.jpg", "nowhere.jpg"], [photo, "--steps", "-1"])
-    for arguments in wrong:
-        given = ["reconstruct", *map(str, arguments), "-o", str(tmp_path / "room")]
-        code = f"""
+    given = [["reconstruct", *map(str, words), "-o", str(tmp_path / "room")] for words in wrong]
+    code = f"""
 import sys
 from panoscene.cli import main
-code = main({given!r})
-print("torch" in sys.modules)
-sys.exit(code)
+for arguments in {given!r}:
+    print("ended with", main(arguments), "torch" in sys.modules)
+    print("ended", file=sys.stderr)
 """
-        command = [sys.executable, "-c", code]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 2
-        assert done.stderr.count("error: ") == sum("jpg" in str(name) for name in arguments)
-        assert done.stdout.split()[-1] == "False"
-        assert not (tmp_path / "room").exists()
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.count("ended with 2 False") == 3
+    assert [said.count("error: ") for said in done.stderr.split("ended")] == [1, 2, 1, 0]
+    assert not (tmp_path / "room").exists()
 
 
 @pytest.mark.usefixtures("loaded")
@@ -138,28 +181,22 @@ def test_resume_leaves_out_what_is_there(
     assert (folder / "scene.json").read_text() == "made before"
 
 
-def test_results_of_another_photo_do_not_count(
-    loaded: dict[str, Any], run: Run, photo: Path, tmp_path: Path
-) -> None:
-    folder = tmp_path / "room"
-    other = shutil.copy(photo, tmp_path / "other.jpg")
-    assert run(other, "-o", folder, "--steps", 0)[0] == 0
-    code, out, _ = run(photo, "-o", folder, "--steps", 0, "--resume")
+@pytest.mark.usefixtures("loaded", "drawn_here")
+def test_results_of_another_photo_do_not_count(made: Made, run: Run, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(made.folder, tmp_path / "room"))
+    other = Path(shutil.copy(made.photo, tmp_path / "other.jpg"))
+    code, out, _ = run(other, "-o", folder, "--steps", 0, "--resume")
     assert code == 0
-    assert "flat: a room" in out
-    assert json.loads((folder / "reconstruction.json").read_text())["photo"] == "flat.jpg"
-    assert "nothing was done" in run(photo, "-o", folder, "--resume")[1]
+    assert "other: a room" in out
+    assert json.loads((folder / "reconstruction.json").read_text())["photo"] == "other.jpg"
+    assert "nothing was done" in run(other, "-o", folder, "--resume")[1]
 
 
+@pytest.mark.usefixtures("loaded", "drawn_here")
 def test_who_is_interrupted_over_older_results_leaves_no_scene(
-    loaded: dict[str, Any],
-    run: Run,
-    photo: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    made: Made, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / "room"
-    assert run(photo, "-o", folder, "--steps", 0)[0] == 0
+    folder = Path(shutil.copytree(made.folder, tmp_path / "room"))
     files: list[Path] = []
 
     def interrupted(path: Path, data: bytes) -> None:
@@ -168,7 +205,7 @@ def test_who_is_interrupted_over_older_results_leaves_no_scene(
             raise KeyboardInterrupt
 
     monkeypatch.setattr("panoscene.cli._results.write_bytes", interrupted)
-    assert run(photo, "-o", folder, "--steps", 0)[0] == 130
+    assert run(made.photo, "-o", folder, "--steps", 0)[0] == 130
     assert len(files) == 2
     assert not (folder / "scene.json").exists()
 
@@ -231,6 +268,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(
     assert knowing.asked == []
 
 
+@pytest.mark.usefixtures("drawn_here")
 def test_missing_and_damaged_weights_are_refused(run: Run, photo: Path, tmp_path: Path) -> None:
     weights = tmp_path / "weights"
     weights.mkdir()

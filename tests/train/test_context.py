@@ -151,6 +151,7 @@ def test_gradients_of_arranged_boxes_reach_the_pose_network(folder: Path) -> Non
     assert {rate for name, rate in rates.items() if name.startswith("context.")} == {1.0}
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_steps_follow_each_other_and_resume(folder: Path, tmp_path: Path) -> None:
     whole = train(recipe_for(folder, "relations"), tmp_path / "whole", context_task)
     first = recipe_for(folder, "relations")

@@ -86,6 +86,7 @@ def _rooms() -> list[Home]:
     return [_large_room(kind, 0) for kind in get_args(RoomKind)]
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_every_category_occurs() -> None:
     more: list[tuple[RoomKind, int]] = [("child", 1), ("kitchen", 1), ("kitchen", 2), ("living", 1)]
     homes = [*_many(), *_rooms(), *(_large_room(kind, seed) for kind, seed in more)]

@@ -26,6 +26,7 @@ def _homes(count: int) -> list[Home]:
     return [_home(seed) for seed in range(count)]
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_rooms_have_the_wanted_numbers_of_corners() -> None:
     statistics = home_statistics(_homes(PLANS))
     shares = statistics.corner_shares

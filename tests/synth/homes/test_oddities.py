@@ -106,6 +106,7 @@ def test_a_cupboard_without_a_top_is_known() -> None:
     assert not has_top(model.vertices, open_, support)
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_shelves_hold_things_on_their_boards() -> None:
     shelves = of("shelf")
     assert len(shelves) > 5
