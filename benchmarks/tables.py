@@ -116,8 +116,8 @@ def synth_text() -> dict[str, str]:
     hours = measured["panorama_s"] / 3600
     text = (
         f"{measured['measured_panoramas']} panoramas on {machine['processor']}, "
-        f"{machine['cores']} cores, with nothing else running. At this rate the {whole:,} of "
-        f"`full.yaml` take {whole * hours:.1f} hours, and those after the first 400 "
+        f"{machine['cores']} cores. At this rate the {whole:,} of `full.yaml` "
+        f"take {whole * hours:.1f} hours, and those after the first 400 "
         f"{(whole - 400) * hours:.1f}."
     )
     return {"synth": f"{synth_benchmark_table(measured)}\n\n{text}"}

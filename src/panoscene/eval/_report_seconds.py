@@ -10,7 +10,7 @@ _PARTS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("photo made upright", ("upright_s",), ()),
     (
         "detector, layout, boxes and relations",
-        ("detector_s", "layout_s", "pose_s", "context_s"),
+        ("detector_s", "layout_s", "pose_s", "codes_s", "context_s"),
         ("initial estimation", "RGCN"),
     ),
     ("arrangement", ("arrangement_s",), ("RO",)),
