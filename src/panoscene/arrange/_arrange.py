@@ -160,7 +160,7 @@ def energy(
     """
     problem = make_problem(batch, settings, weights)
     if boxes is None:
-        return energy_terms(problem.start, problem)
+        return energy_terms(problem.start, problem, batch.boxes)
     return energy_of_boxes(boxes, problem)
 
 

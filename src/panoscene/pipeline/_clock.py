@@ -26,10 +26,12 @@ class Clock:
 
     @contextmanager
     def __call__(self, part: str) -> Iterator[None]:
-        """Measure a part; what is measured within it is not counted twice."""
+        """Measure a part, as often as it is at work; what is measured within it counts once."""
         before, self._within = self._within, 0.0
         start = time.perf_counter()
-        yield
-        spent = time.perf_counter() - start
-        self.seconds[part] = spent - self._within
-        self._within = before + spent
+        try:
+            yield
+        finally:
+            spent = time.perf_counter() - start
+            self.seconds[part] = self.seconds.get(part, 0.0) + spent - self._within
+            self._within = before + spent

@@ -219,12 +219,14 @@ def test_coarse_pictures_may_end_farther_from_a_face():
 
 
 @pytest.fixture(scope="module")
-def edge_on(photograph, library) -> Loaded:
+def edge_on(request, photograph, library) -> Loaded:
     """A hood whose pane is at the height of the camera, and falls between the pixels."""
+    pitch, roll = request.param
+    camera = replace(CAMERA, pitch=pitch, roll=roll, width=640, height=320)
     scene = replace(
         box_home(), placed=(PlacedModel(library["test/range_hood"], pose(2, 3.8, 1.948, np.pi), 1),)
     )
-    panorama = label_panorama(scene, photograph(scene, replace(CAMERA, width=640, height=320)))
+    panorama = label_panorama(scene, photograph(scene, camera))
     rendered = panorama.rendered
     return Loaded(
         "edge on", panorama.scene, panorama.labels, rendered.rgb,
@@ -233,7 +235,11 @@ def edge_on(photograph, library) -> Loaded:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("with_meshes", [True, False])
+@pytest.mark.parametrize(
+    ("edge_on", "with_meshes"),
+    [((0.0, 0.0), True), ((0.0, 0.0), False), ((-0.08, 0.06), True)],
+    indirect=["edge_on"],
+)
 def test_thin_parts_seen_edge_on_are_let_pass_but_no_larger_boxes(edge_on, with_meshes: bool):
     panorama = edge_on if with_meshes else replace(edge_on, library=None)
     names = [label.category for label in panorama.labels.objects]

@@ -8,6 +8,8 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 _MARGIN = 0.01
 """Radians around the cone that holds the object."""
 _RAYS = 8000
+_LEVEL = 1e-6
+"""Differences of height that are rounding."""
 _NOWHERE = 1e6
 """Metres; rays that meet nothing come back with more."""
 
@@ -54,7 +56,12 @@ def points_seen_alone(
         vertices: Relative to the camera, in the frame of the directions.
         faces: Seen from both sides.
         directions: Of the pixels, of unit length, row by row from the top.
+
+    Raises:
+        ValueError: The directions rise somewhere, as those of a tilted photo in the world frame.
     """
+    if (np.diff(directions[:, 2]) > _LEVEL).any():
+        raise ValueError("directions: found some that rise, expected rows from the top")
     candidates = _may_meet(vertices, directions, np.ones(len(directions), np.bool_))
     rays = np.ascontiguousarray(directions[candidates])
     if len(rays) == 0:
@@ -100,7 +107,7 @@ def _level_with(
     middle = np.arccos(np.clip(axis[2], -1.0, 1.0))
     high, low = np.cos(max(middle - reach, 0.0)), np.cos(min(middle + reach, np.pi))
     # two searches in what rises
-    first, last = np.searchsorted(-height, (-high - 1e-6, -low + 1e-6))
+    first, last = np.searchsorted(-height, (-high - _LEVEL, -low + _LEVEL))
     return int(first), int(last)
 
 

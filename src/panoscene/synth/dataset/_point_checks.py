@@ -5,6 +5,7 @@ import numpy as np
 from ._amodal import points_seen_alone
 from ._format import ObjectLabel
 from ._loaded import Loaded
+from ._pixels import pixel_directions
 from ._semantic import UNLABELLED, semantic_value
 from ._things import moved
 
@@ -96,11 +97,13 @@ def _is_thin_there(
     own = (vertices - label.box.centre) @ turn.T
     if (_gaps(own, eye, half) > _ALIKE).any():
         return False  # the box is larger than the mesh
-    rays = panorama.directions.reshape(-1, 3).astype(np.float32)
-    alone = points_seen_alone(vertices - panorama.eye, model.faces.astype(np.int32), rays)
+    # in the photo's own frame, where directions fall from row to row
+    rays = pixel_directions(*panorama.instance.shape).reshape(-1, 3).astype(np.float32)
+    local = (vertices - panorama.eye) @ panorama.upright
+    alone = points_seen_alone(local, model.faces.astype(np.int32), rays)
     if len(alone) == 0:
         return False
-    alone = (alone + panorama.eye - label.box.centre) @ turn.T
+    alone = (alone @ panorama.upright.T + panorama.eye - label.box.centre) @ turn.T
     return bool((gaps <= _gaps(alone, eye, half) + _ALIKE).all())
 
 
