@@ -13,7 +13,9 @@ import struct
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -563,6 +565,40 @@ def test_view_shows_the_photo_upright_and_saves_its_name(
     assert shown.panorama.file == "../tilted.png"
     assert options["save_to"] == Path("deep/edited.json")
     assert float(options["image"][0, 32, 64]) > 0.9
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+def test_an_interrupt_that_a_library_drops_ends_the_view(
+    folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    stopped: list[bool] = []
+
+    class Viewer:
+        url = "nowhere"
+
+        def __enter__(self) -> "Viewer":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            stopped.append(True)
+
+        def wait(self) -> None:
+            raise AssertionError("waits for another Ctrl-C")
+
+    def serve(*_: object, **__: object) -> Viewer:
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        return Viewer()
+
+    monkeypatch.setattr("panoscene.viewer.serve", serve)
+    try:
+        assert run("view", "room.json", "--port", "0") == (0, "", "")
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert stopped == [True]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")

@@ -11,6 +11,7 @@ from panoscene.cli._doubts import note_doubts
 from panoscene.cli._errors import InputError
 from panoscene.cli._files import blaming, write_bytes, writing
 from panoscene.cli._folders import check_folder
+from panoscene.cli._interrupt import remembered_interrupt
 from panoscene.cli._photos import photo_image
 from panoscene.cli._progress import progress_words
 from panoscene.cli._terminal import note
@@ -123,9 +124,11 @@ def serve_file(
         with writing(save_to):
             scene = relocate_photo(scene, file, save_to)
     try:
-        with blaming(f"view {file}"):
+        with remembered_interrupt() as asked, blaming(f"view {file}"):
             viewer = serve(scene, host=host, port=port, image=image, save_to=save_to)
         with viewer:
+            if asked.is_set():
+                return 0
             note(f"{viewer.url} shows {file}; press Ctrl-C to end")
             viewer.wait()
     except KeyboardInterrupt:

@@ -81,11 +81,12 @@ Needs pip install 'panoscene[synth]' and, on Linux, LLVM (apt-get install libllv
 """What the commands of two words have in common, by their first word."""
 
 OVERVIEW = """\
-Describe furnished rooms, derive how their objects relate, and repair their arrangement. Each
-command explains itself, as in panoscene arrange --help; panoscene --version prints the version.
+Turn 360-degree photos of rooms into 3D scenes: the room, its objects, and how they relate.
+Describe, repair, draw and score such scenes, train the networks, and make data for them. Each
+command explains itself, as in panoscene reconstruct --help; panoscene --version prints the version.
 For example:
 
-    panoscene demo -o demo
+    panoscene reconstruct photo.jpg -o room
     panoscene arrange room.json -o repaired.json
 """
 

@@ -152,10 +152,14 @@ def describe_violations(violations: Violations) -> str:
         >>> from panoscene.arrange import Violations
         >>> describe_violations(Violations(0.0, {}, 2, 0.123, 0.2, 0.05, 0.314))
         '2 pairs collide · worst overlap 12 cm · 0.31 m³ outside the room'
+        >>> describe_violations(Violations(0.0, {}, 0, 0.08, 0.2, 0.05, 0.314))
+        'no pair collides by 10 cm · worst overlap 8 cm · 0.31 m³ outside the room'
     """
     count = violations.colliding_pairs
-    pairs = {0: "no pair collides", 1: "1 pair collides"}.get(count, f"{count} pairs collide")
     depth = 100.0 * violations.worst_penetration
+    # who reads of an overlap beside it must know from where on the paper counts one
+    none = "no pair collides" if depth < 0.05 else "no pair collides by 10 cm"
+    pairs = {0: none, 1: "1 pair collides"}.get(count, f"{count} pairs collide")
     worst = f"{depth:.0f} cm" if depth >= 1.0 else f"{10.0 * depth:.0f} mm"
     overlap = "no overlap" if depth < 0.05 else f"worst overlap {worst}"
     volume = violations.out_of_room_volume
