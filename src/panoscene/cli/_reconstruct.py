@@ -105,7 +105,7 @@ class Task:
         except (OSError, ValueError):
             return True
         name = self.file.resolve().name
-        return account.get("photo", name) == name
+        return not isinstance(account, dict) or account.get("photo", name) == name
 
 
 @dataclass(frozen=True, slots=True)
