@@ -190,6 +190,9 @@ def test_results_of_another_photo_do_not_count(made: Made, run: Run, tmp_path: P
     assert "other: a room" in out
     assert json.loads((folder / "reconstruction.json").read_text())["photo"] == "other.jpg"
     assert "nothing was done" in run(other, "-o", folder, "--resume")[1]
+    # what says nothing of a photo does not speak against it
+    (folder / "reconstruction.json").write_text("[]")
+    assert "nothing was done" in run(other, "-o", folder, "--resume")[1]
 
 
 @pytest.mark.usefixtures("loaded", "drawn_here")
