@@ -19,7 +19,7 @@ from panoscene.eval import (
 from panoscene.eval._layout_scores import layout_of_sums, layout_sums
 from panoscene.eval._methods import mean_box_scene
 from panoscene.eval._plausibility import plausibility_of_sums, plausibility_sums
-from panoscene.eval._pooling import pooled_metrics
+from panoscene.eval._pooling import pooled_differences, pooled_metrics
 from panoscene.eval._relation_records import relation_sums, relations_of_sums
 from panoscene.eval._scene_records import SceneRecords, scene_records
 from panoscene.scene import CATEGORIES
@@ -125,3 +125,28 @@ def test_intervals_of_mean_ap_are_central_and_cover() -> None:
     assert 0.43 < np.mean(place) < 0.57
     assert abs(np.mean(place) - 0.5) < abs(np.mean(plain_place) - 0.5)
     assert covered / TRIALS >= 0.88
+
+
+def test_differences_are_those_of_the_metrics_on_the_same_resamples(
+    records: list[SceneRecords],
+) -> None:
+    targets = sample_targets(5, 3)
+    true = scene_records(targets, targets)
+    ours, theirs = (pooled_metrics(some, {}, replicates=0, seed=0) for some in (true, records))
+    found = pooled_differences(true, records, replicates=60, seed=2)
+    for name in ("detection.recall_15", "detection.matched_iou", "fidelity.on_floor_f1"):
+        first, second = ours[name].value, theirs[name].value
+        assert first is not None
+        assert second is not None
+        value, low, high = found[name].value, found[name].low, found[name].high
+        assert value == pytest.approx(first - second), name
+        assert low is not None
+        assert high is not None
+        assert low <= first - second <= high, name
+    assert (found["detection.recall_15"].low or 0) > 0  # better in every scene
+    same = pooled_differences(records, records, replicates=60, seed=2)
+    assert {(row.value, row.low, row.high) for row in same.values() if row.value is not None} == {
+        (0, 0, 0)
+    }
+    with pytest.raises(ValueError, match="found 5 and 4"):
+        pooled_differences(records, records[1:], replicates=1, seed=0)

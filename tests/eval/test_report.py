@@ -346,3 +346,14 @@ def test_parts_of_the_set_have_rows_of_their_own() -> None:
         [" `test-unseen` ", " 18.5 "],
     ]
     assert "## Parts of the set" not in results_page([rendered("pose")])
+
+
+def test_differences_have_a_table_that_says_which_are_decided() -> None:
+    sure = Measured(value=-1.94, low=-2.3, high=-1.6)
+    open_ = Measured(value=0.004, low=-0.01, high=0.02)
+    metrics = {"plausibility.paper_colliding_pairs": sure, "detection.ap_15_mean_57": open_}
+    full = rendered("full").model_copy(update={"differences": {"pose": metrics}})
+    text = part(results_page([full, rendered("pose")]), "What the parts bring")
+    assert "| `full` | `pose` | +0.4 [-1.0, 2.0] | **-1.94 [-2.30, -1.60]** |" in text
+    assert "`full` against `pose` is decided in colliding pairs." in text
+    assert "What the parts bring" not in results_page([rendered("full"), rendered("pose")])

@@ -1,6 +1,7 @@
 """Predictions to disk, scores from disk, pages from scores."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -277,3 +278,25 @@ def test_the_benchmark_scores_as_many_rooms_as_it_says() -> None:
     assert "2 scenes of 3 objects" in score_benchmark_table(result)
     with pytest.raises(ValueError, match="workers"):
         run_score_benchmark(workers=0)
+
+
+def test_methods_are_compared_with_those_that_the_export_names(
+    export: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "export"
+    shutil.copytree(export, folder)
+    facts = json.loads((folder / "export.json").read_text())
+    facts["methods"]["default"]["compared_with"] = ["mean-box", "estimates", "not there"]
+    (folder / "export.json").write_text(json.dumps(facts))
+    results = str(tmp_path / "results")
+    assert main(["eval", "score", str(folder), "-o", results, "--replicates", "20"]) == 0
+    found = {name: read_scores(tmp_path / "results" / f"{name}.json") for name in CHOSEN}
+    differences = found["default"].differences
+    assert list(differences) == ["mean-box", "estimates"]
+    assert [name for name in CHOSEN if found[name].differences] == ["default"]
+    for other, metrics in differences.items():
+        ours, theirs = found["default"].metrics, found[other].metrics
+        first, second = (some["detection.recall_15"].value for some in (ours, theirs))
+        assert first is not None
+        assert second is not None
+        assert metrics["detection.recall_15"].value == pytest.approx(first - second)

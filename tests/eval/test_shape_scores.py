@@ -1,6 +1,7 @@
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 import torch
 import trimesh
@@ -8,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from panoscene.eval._shape_errors import ShapeErrors, shape_errors, volume_iou
-from panoscene.eval._shape_scores import canonical_mesh, score_shapes, shape_record
+from panoscene.eval._shape_records import canonical_mesh, shape_record
+from panoscene.eval._shape_scores import score_shapes, shape_sums, shapes_of_sums
 from panoscene.eval._surface_distance import sample_surface, surface_distance, triangle_distance
 from panoscene.geometry import OrientedBoxes
 from panoscene.scene import Layout, Mesh, Panorama, Scene, Shapes, box_mesh, objects_from_boxes
@@ -247,3 +249,16 @@ def test_a_wrong_match_is_refused(match: list[int], generator: torch.Generator) 
     scene = scene_of(box_mesh(), box_mesh())
     with pytest.raises(ValueError, match="match: expected"):
         shape_record(scene, scene, generator=generator, match=torch.tensor(match), points=10)
+
+
+def test_sums_of_scenes_are_worth_as_much_as_the_scenes(generator: torch.Generator) -> None:
+    ball = Mesh(sphere(0.5).vertices.float(), sphere(0.5).faces)
+    target, boxes = scene_of(ball, ball), scene_of(None, box_mesh())
+    first = shape_record(boxes, target, generator=generator, points=300)
+    second = shape_record(None, target, generator=generator, points=300)
+    drawn = np.array([2, 1, 3]) @ shape_sums([first, second, None])
+    found, expected = shapes_of_sums(drawn), score_shapes([first, first, second])
+    assert (found.targets, found.matched, found.boxes_stand_in) == (6, 4, 2)
+    for part in ("canonical", "canonical_with_misses", "world", "world_with_misses", "scene"):
+        ours, theirs = (dataclasses.asdict(getattr(some, part)) for some in (found, expected))
+        assert ours == pytest.approx(theirs), part

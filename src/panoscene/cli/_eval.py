@@ -22,16 +22,18 @@ from panoscene.eval import (
     SUMMARY,
     TARGETS,
     ExportedMethod,
+    FolderRecords,
     Manifest,
     ScoreFile,
     export_predictions,
     export_reconstructions,
     in_order,
+    measure_folder,
     read_manifest,
     read_scores,
     results_page,
     sample_targets,
-    score_folder,
+    score_records,
     score_table,
     summary_note,
     summary_table,
@@ -140,22 +142,36 @@ def run_score(
     jobs, known = _jobs(source, targets)
     results: list[ScoreFile] = []
     count = sum(len(list(job[2].glob("*.json"))) for job in jobs)
+    folders = {folder.name: (folder, truth) for folder, _, truth in jobs}
+    wanted = {name for _, facts, _ in jobs for name in facts.compared_with}
+    measured: dict[str, FolderRecords] = {}
     with progress_bar("scoring", count) as advance:
-        for folder, facts, truth in jobs:
-            score = score_folder(
-                folder,
-                truth,
+
+        def records_of(name: str) -> FolderRecords:
+            if name not in measured:
+                folder, truth = folders[name]
+                measured[name] = measure_folder(
+                    folder,
+                    truth,
+                    shapes=shapes,
+                    workers=workers or os.cpu_count() or 1,
+                    progress=advance,
+                    warn=_warn,
+                )
+            return measured[name] if name in wanted else measured.pop(name)
+
+        for folder, facts, _ in jobs:
+            others = [name for name in facts.compared_with if name in folders]
+            score = score_records(
+                records_of(folder.name),
                 method=folder.name,
                 kind=facts.kind,
                 description=facts.description,
                 fov_deg=facts.fov_deg,
                 data=known.data,
                 parts=known.parts,
-                shapes=shapes and (targets is not None or _has_meshes(folder)),
+                others={name: records_of(name) for name in others},
                 replicates=replicates,
-                workers=workers or os.cpu_count() or 1,
-                progress=advance,
-                warn=_warn,
             )
             results.append(score)
             if output is not None:
@@ -168,11 +184,6 @@ def run_score(
     else:
         say(score_table(results, SUMMARY))
     return 0
-
-
-def _has_meshes(folder: Path) -> bool:
-    """Return whether a method predicts shapes; boxes that stand in for them need no score."""
-    return any(b'"mesh":' in file.read_bytes() for file in folder.glob("*.json"))
 
 
 def _warn(text: str) -> None:

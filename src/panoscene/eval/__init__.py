@@ -101,7 +101,10 @@ from panoscene.eval._results import write_scores as write_scores
 from panoscene.eval._scene_records import SceneRecords as SceneRecords
 from panoscene.eval._scene_records import empty_scene as empty_scene
 from panoscene.eval._scene_records import scene_records as scene_records
+from panoscene.eval._score import FolderRecords as FolderRecords
+from panoscene.eval._score import measure_folder as measure_folder
 from panoscene.eval._score import score_folder as score_folder
+from panoscene.eval._score import score_records as score_records
 from panoscene.eval._score_benchmark import run_score_benchmark as run_score_benchmark
 from panoscene.eval._score_benchmark import score_benchmark_table as score_benchmark_table
 from panoscene.eval._score_tables import SUMMARY as SUMMARY
@@ -118,10 +121,10 @@ from panoscene.eval._semantic_labels import sphere_directions as sphere_directio
 from panoscene.eval._shape_errors import ShapeErrors as ShapeErrors
 from panoscene.eval._shape_errors import shape_errors as shape_errors
 from panoscene.eval._shape_errors import volume_iou as volume_iou
+from panoscene.eval._shape_records import ShapePair as ShapePair
+from panoscene.eval._shape_records import ShapeRecord as ShapeRecord
+from panoscene.eval._shape_records import canonical_mesh as canonical_mesh
+from panoscene.eval._shape_records import shape_record as shape_record
 from panoscene.eval._shape_scores import ShapeMeans as ShapeMeans
-from panoscene.eval._shape_scores import ShapePair as ShapePair
-from panoscene.eval._shape_scores import ShapeRecord as ShapeRecord
 from panoscene.eval._shape_scores import ShapeScores as ShapeScores
-from panoscene.eval._shape_scores import canonical_mesh as canonical_mesh
 from panoscene.eval._shape_scores import score_shapes as score_shapes
-from panoscene.eval._shape_scores import shape_record as shape_record

@@ -34,6 +34,8 @@ class ExportedMethod:
     description: str
     fov_deg: int = FOV_DEG[0]
     """Horizontal degrees that the method sees at a time."""
+    compared_with: tuple[str, ...] = ()
+    """Methods that it should be better than: differences to them are measured scene by scene."""
 
 
 class Manifest(BaseModel):

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int64
 
 from panoscene.eval._bootstrap import bias_corrected_intervals, bootstrap_weights
 from panoscene.eval._detection import DetectionScores, score_detection
-from panoscene.eval._detection_records import DetectionRecord, pool_match_errors
+from panoscene.eval._detection_records import DetectionRecord
 from panoscene.eval._layout_scores import layout_of_sums, layout_sums
 from panoscene.eval._mesh_penetration import (
     penetration_of_sums,
@@ -20,22 +20,27 @@ from panoscene.eval._plausibility import (
     PlausibilityRecord,
     plausibility_of_sums,
     plausibility_sums,
+    ratio,
 )
 from panoscene.eval._relation_records import relation_sums, relations_of_sums
 from panoscene.eval._results import Measured
 from panoscene.eval._scene_records import SceneRecords
 from panoscene.eval._semantic import SemanticRecord, label_ious, mean_ious
-from panoscene.eval._shape_scores import score_shapes
+from panoscene.eval._shape_scores import shape_sums, shapes_of_sums
 from panoscene.scene import CATEGORIES, COMMON_11, PANOCONTEXT_12
 
 RECALL_LEVELS = (0.2, 0.4, 0.6)
 """Recalls at which methods are compared as equals."""
+_ERRORS = ("iou", "centre_error", "yaw_error", "size_error")
+"""Of matched boxes."""
 
 Values = dict[str, float | None]
 Table = Float[np.ndarray, "scenes columns"]
 """Numbers of each scene; the scores of a set of scenes follow from their sums."""
 Score = Callable[[Float[np.ndarray, " columns"]], Values]
 """From sums over scenes to named scores."""
+Drawn = tuple[float | None, Float[np.ndarray, " replicates"]]
+"""A score on all scenes, and on each resample of them; NaN where it does not exist."""
 
 
 def pooled_metrics(
@@ -58,8 +63,65 @@ def pooled_metrics(
     """
     if not records:
         raise ValueError("records: expected those of at least one scene, found none")
+    drawn = _drawn(records, at_recall, _weights(len(records), replicates, seed))
+    measured = {name: _measured(*both) for name, both in drawn.items()}
+    depths = [record.penetration for record in records if record.penetration is not None]
+    if len(depths) == len(records):
+        worst = score_penetration(depths)["worst_penetration"]
+        measured["penetration.worst_penetration"] = Measured(value=finite(worst))
+    return measured
+
+
+def pooled_differences(
+    records: Sequence[SceneRecords],
+    others: Sequence[SceneRecords],
+    *,
+    replicates: int,
+    seed: int,
+) -> dict[str, Measured]:
+    """Return by how much the metrics of one method are above those of another, by their names.
+
+    Both are measured on the same resamples, scene by scene, so what makes a scene hard for both
+    cancels out: such an interval is narrower than those of the two metrics suggest. Metrics at a
+    common recall and those that only one of the methods has are left out.
+
+    Args:
+        records: one for each scene.
+        others: those of the other method, of the same scenes in the same order.
+        replicates: bootstrap resamples; 0 for no intervals.
+        seed: of the resampling.
+
+    Raises:
+        ValueError: there are no records, or not as many of both.
+    """
+    if not records or len(records) != len(others):
+        raise ValueError(f"records: found {len(records)} and {len(others)}, expected as many")
+    weights = _weights(len(records), replicates, seed)
+    ours, theirs = (_drawn(some, {}, weights) for some in (records, others))
+    differences: dict[str, Measured] = {}
+    for name in ours:
+        if name in theirs:
+            (value, column), (other, beside) = ours[name], theirs[name]
+            both = None if value is None or other is None else value - other
+            differences[name] = _measured(both, column - beside)
+    return differences
+
+
+def _weights(scenes: int, replicates: int, seed: int) -> Int64[np.ndarray, "replicates scenes"]:
+    if not replicates:
+        return np.zeros((0, scenes), dtype=np.int64)
+    return bootstrap_weights(scenes, np.random.default_rng(seed), replicates=replicates)
+
+
+def _drawn(
+    records: Sequence[SceneRecords],
+    at_recall: Mapping[float, Sequence[PlausibilityRecord] | None],
+    weights: Int64[np.ndarray, "replicates scenes"],
+) -> dict[str, Drawn]:
+    """Return every metric by its dotted name."""
     boxes = [record.plausibility for record in records]
     parts: dict[str, tuple[Table, Score]] = {
+        "detection": _matched_part([record.detection for record in records]),
         "plausibility": (plausibility_sums(boxes), plausibility_of_sums),
         "fidelity": (relation_sums([r.fidelity for r in records]), relations_of_sums),
         "layout": (layout_sums([r.layout for r in records]), layout_values),
@@ -75,22 +137,18 @@ def pooled_metrics(
     depths = [record.penetration for record in records if record.penetration is not None]
     if len(depths) == len(records):
         parts["penetration"] = (penetration_sums(depths), penetration_of_sums)
-    weights = (
-        bootstrap_weights(len(records), np.random.default_rng(seed), replicates=replicates)
-        if replicates
-        else np.zeros((0, len(records)), dtype=np.int64)
-    )
-    measured = _detection_metrics([record.detection for record in records], weights)
-    for name, (table, score) in parts.items():
-        measured |= _with_intervals(name, table, score, weights)
-    if "penetration" in parts:
-        worst = score_penetration(depths)["worst_penetration"]
-        measured["penetration.worst_penetration"] = Measured(value=finite(worst))
-    shapes = [record.shape for record in records if record.shape is not None]
-    if shapes:
-        values = {"shape." + key: value for key, value in _flat(asdict(score_shapes(shapes)))}
-        measured |= {key: Measured(value=value) for key, value in values.items()}
-    return measured
+    shapes = [record.shape for record in records]
+    if any(shape is not None for shape in shapes):
+        parts["shape"] = (shape_sums(shapes), _shape_values)
+    drawn = _drawn_detection([record.detection for record in records], weights)
+    for group, (table, score) in parts.items():
+        values = score(table.sum(axis=0))
+        again = [score(sums) for sums in weights @ table]
+        drawn |= {
+            f"{group}.{name}": (value, np.array([_number(draw.get(name)) for draw in again]))
+            for name, value in values.items()
+        }
+    return drawn
 
 
 def pooled_categories(records: Sequence[SceneRecords]) -> dict[str, dict[str, Measured]]:
@@ -141,21 +199,37 @@ def finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
 
 
-def _detection_metrics(
+def _drawn_detection(
     records: Sequence[DetectionRecord], weights: Int64[np.ndarray, "replicates scenes"]
-) -> dict[str, Measured]:
+) -> dict[str, Drawn]:
     whole = score_detection(records)
-    drawn: dict[str, np.ndarray] = {}
+    values, again = detection_values(whole), {}
     if len(weights):
         resampled = score_detection(records, weights=weights)
-        drawn = detection_values(resampled.with_missing_areas_of(whole))
-    values = {name: float(value) for name, value in detection_values(whole).items()}
-    measured = _measured(values, drawn)
-    errors = pool_match_errors(records)
-    for name in ("iou", "centre_error", "yaw_error", "size_error"):
-        column = getattr(errors, name)
-        measured[f"matched_{name}"] = Measured(value=finite(column.mean() if len(column) else None))
-    return {f"detection.{name}": value for name, value in measured.items()}
+        again = detection_values(resampled.with_missing_areas_of(whole))
+    return {
+        f"detection.{name}": (finite(float(value)), again.get(name, np.zeros(0)))
+        for name, value in values.items()
+    }
+
+
+def _matched_part(records: Sequence[DetectionRecord]) -> tuple[Table, Score]:
+    """Return how many objects of each scene are matched with the sums of their errors."""
+    rows = [
+        (len(record.errors.iou), *(getattr(record.errors, name).sum() for name in _ERRORS))
+        for record in records
+    ]
+
+    def score(sums: Float[np.ndarray, " columns"]) -> Values:
+        count, *errors = sums.tolist()
+        means = [ratio(error, count) for error in errors]
+        return {f"matched_{name}": mean for name, mean in zip(_ERRORS, means, strict=True)}
+
+    return np.array(rows, dtype=np.float64), score
+
+
+def _shape_values(sums: Float[np.ndarray, " columns"]) -> Values:
+    return dict(_flat(asdict(shapes_of_sums(sums))))
 
 
 def _semantic_part(records: Sequence[SemanticRecord]) -> tuple[Table, Score]:
@@ -176,31 +250,11 @@ def _semantic_part(records: Sequence[SemanticRecord]) -> tuple[Table, Score]:
     return counts.reshape(len(records), -1), score
 
 
-def _with_intervals(
-    group: str, table: Table, score: Score, weights: Int64[np.ndarray, "replicates scenes"]
-) -> dict[str, Measured]:
-    """Return scores of added rows of a table, with intervals from resampled rows."""
-    values = score(table.sum(axis=0))
-    again = [score(sums) for sums in weights @ table]
-    columns = {
-        name: np.array([_number(draw.get(name)) for draw in again], dtype=np.float64)
-        for name in (values if again else ())
-    }
-    return {f"{group}.{name}": value for name, value in _measured(values, columns).items()}
-
-
-def _measured(
-    values: Mapping[str, float | None], replicates: Mapping[str, np.ndarray]
-) -> dict[str, Measured]:
-    result: dict[str, Measured] = {}
-    for name, value in values.items():
-        low = high = None
-        if name in replicates:
-            column = np.asarray(replicates[name], dtype=np.float64)[:, None]
-            (interval,) = bias_corrected_intervals(np.array([_number(value)]), column)
-            low, high = interval.low, interval.high
-        result[name] = Measured(value=finite(value), low=finite(low), high=finite(high))
-    return result
+def _measured(value: float | None, replicates: Float[np.ndarray, " replicates"]) -> Measured:
+    if not len(replicates):
+        return Measured(value=finite(value))
+    (interval,) = bias_corrected_intervals(np.array([_number(value)]), replicates[:, None])
+    return Measured(value=finite(value), low=finite(interval.low), high=finite(interval.high))
 
 
 def _number(value: float | None) -> float:

@@ -13,12 +13,17 @@ ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
             "ours",
             "the whole pipeline; the relations are those of its boxes, and contacts that the"
             " network thinks likely where boxes are at most 0.3 m apart",
+            compared_with=("without-arrangement", "pose"),
         ),
         "without-arrangement": ExportedMethod(
-            "ours", "the same without the arrangement; the relations are what the network says"
+            "ours",
+            "the same without the arrangement; the relations are what the network says",
+            compared_with=("pose",),
         ),
         "pose-arranged": ExportedMethod(
-            "ours", "the pose network's boxes, arranged with relations that follow from them"
+            "ours",
+            "the pose network's boxes, arranged with relations that follow from them",
+            compared_with=("pose",),
         ),
         "pose": ExportedMethod(
             "input", "the pose network's boxes alone, relations by a geometric rule"

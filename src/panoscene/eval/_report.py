@@ -11,6 +11,7 @@ from panoscene.eval._paper_rows import (
     paper_semantic_rows,
 )
 from panoscene.eval._published import PAPER_ABLATION
+from panoscene.eval._report_differences import differences_part
 from panoscene.eval._report_facts import (
     are_rendered,
     are_simulated,
@@ -65,6 +66,7 @@ def results_page(scores: Sequence[ScoreFile], timings: Mapping[str, Any] | None 
     whole = whole_rooms(scores)
     parts = [
         *_introduction(scores),
+        *differences_part(whole),
         *_detection_part(whole),
         *_plausibility_part(whole),
         *relations_part(whole),
@@ -214,8 +216,8 @@ def _intervals(scores: Sequence[ScoreFile]) -> str:
     return (
         f"In brackets the 95 % interval of {' or '.join(map(str, counts))} bootstrap resamples of "
         f"the scenes{none}. It is left out where it is narrower than the last digit; intervals of "
-        f"single labels and corner groups are in {files}. Matched IoU, numbers of targets, "
-        "single categories and comparisons of meshes were not resampled and have none."
+        f"single labels and corner groups are in {files}. Numbers of targets and single "
+        "categories have none."
     )
 
 
@@ -306,7 +308,8 @@ def _meshes_part(scores: Sequence[ScoreFile]) -> list[str]:
             "## Shapes",
             "Meshes against the true ones, each scaled to its box. Chamfer: 1000 times the mean "
             "squared distances, of found objects; all else in percent, a missed object counting "
-            "as 0 unless the heading says `found`. `as boxes`: predicted without a mesh.",
+            "as 0 unless the heading says `found`. `as boxes`: predicted without a mesh, so that "
+            "the box stands in; rows of boxes alone say what the shape network is good for.",
             score_table(scores, SHAPE),
         ]
     else:

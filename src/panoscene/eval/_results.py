@@ -61,6 +61,8 @@ class ScoreFile(_Model):
     """Per category; categories without targets and predictions are left out."""
     parts: dict[str, dict[str, Measured]] = {}
     """The metrics of single parts of the data set; empty if there is one part only."""
+    differences: dict[str, dict[str, Measured]] = {}
+    """By how much the metrics are above those of other methods, scene by scene; by their names."""
 
 
 def write_scores(scores: ScoreFile, path: str | os.PathLike[str]) -> None:

@@ -15,7 +15,7 @@ from panoscene.eval._plausibility import PlausibilityRecord, plausibility_record
 from panoscene.eval._relation_records import RelationRecord
 from panoscene.eval._relation_scores import fidelity_record, relation_record
 from panoscene.eval._semantic import SemanticRecord, semantic_record
-from panoscene.eval._shape_scores import ShapeRecord, shape_record
+from panoscene.eval._shape_records import ShapeRecord, shape_record
 from panoscene.geometry import OrientedBoxes
 from panoscene.scene import Layout, Objects, Scene
 

@@ -13,7 +13,12 @@ import torch
 from panoscene import __version__
 from panoscene.eval._bootstrap import REPLICATES
 from panoscene.eval._layout_scores import layout_record
-from panoscene.eval._pooling import RECALL_LEVELS, pooled_categories, pooled_metrics
+from panoscene.eval._pooling import (
+    RECALL_LEVELS,
+    pooled_categories,
+    pooled_differences,
+    pooled_metrics,
+)
 from panoscene.eval._predictions import Prediction, read_prediction
 from panoscene.eval._results import Measured, ScoreFile
 from panoscene.eval._scene_records import SceneRecords, records_at_recall, scene_records
@@ -26,13 +31,25 @@ _WORTH_PROCESSES = 128
 
 
 @dataclass(frozen=True, slots=True)
+class FolderRecords:
+    """What was measured on a folder of predictions, scene by scene."""
+
+    predictions: Path
+    targets: Path
+    names: tuple[str, ...]
+    """File names of the scenes."""
+    records: list[SceneRecords]
+    invalid: int
+    """Predictions with something that is not valid."""
+
+
+@dataclass(frozen=True, slots=True)
 class _Scored:
     """What some of the scenes gave."""
 
     records: list[SceneRecords]
     warnings: list[str]
     invalid: int
-    """Predictions with something that is not valid."""
 
 
 def score_folder(
@@ -54,6 +71,39 @@ def score_folder(
 ) -> ScoreFile:
     """Return the scores of a folder of predictions against a folder of targets.
 
+    ``measure_folder`` and ``score_records`` in one; the arguments are explained there.
+
+    Raises:
+        SceneFormatError: a target is not a scene, or a prediction has no target.
+        OSError: a folder or file cannot be read.
+    """
+    measured = measure_folder(
+        predictions, targets, shapes=shapes, workers=workers, progress=progress, warn=warn
+    )
+    return score_records(
+        measured,
+        method=method,
+        kind=kind,
+        description=description,
+        fov_deg=fov_deg,
+        data=data,
+        parts=parts,
+        replicates=replicates,
+        seed=seed,
+    )
+
+
+def measure_folder(
+    predictions: Path,
+    targets: Path,
+    *,
+    shapes: bool = False,
+    workers: int = 1,
+    progress: Callable[[int], None] | None = None,
+    warn: Callable[[str], None] | None = None,
+) -> FolderRecords:
+    """Return what there is to measure on each scene of a folder of predictions.
+
     A prediction belongs to the target with the same file name. A target without a prediction
     counts as an empty room with the worst layout; a prediction without a target is an error.
     What is not valid in a prediction counts as not predicted: the raw polygon, the layout, an
@@ -62,16 +112,7 @@ def score_folder(
     Args:
         predictions: folder of scene.json files.
         targets: folder of scene.json files.
-        method: name of the row in tables; that of the folder when empty.
-        kind: as in ``METHODS``.
-        description: one line about the method.
-        fov_deg: horizontal degrees that the method saw at a time.
-        data: what the targets are.
-        parts: part of the data set that each target is from, by its name; if there are several,
-            each is scored by itself, too.
         shapes: also compare meshes, where the targets have them; slower.
-        replicates: bootstrap resamples of the scenes for the 95 % intervals.
-        seed: of the resampling.
         workers: processes that measure scenes.
         progress: called with the number of scenes done.
         warn: called with one line for each prediction that is missing or not valid.
@@ -103,7 +144,51 @@ def score_folder(
     else:
         for some in map(_measure, jobs):
             keep(some)
-    records = [record for some in measured for record in some.records]
+    return FolderRecords(
+        predictions=predictions,
+        targets=targets,
+        names=tuple(names),
+        records=[record for some in measured for record in some.records],
+        invalid=sum(some.invalid for some in measured),
+    )
+
+
+def score_records(
+    measured: FolderRecords,
+    *,
+    method: str = "",
+    kind: str = "prediction",
+    description: str = "",
+    fov_deg: int = 360,
+    data: str = "",
+    parts: Mapping[str, str] = MappingProxyType({}),
+    others: Mapping[str, FolderRecords] = MappingProxyType({}),
+    replicates: int = REPLICATES,
+    seed: int = 0,
+) -> ScoreFile:
+    """Return the scores of what was measured on a folder of predictions.
+
+    Args:
+        measured: from ``measure_folder``.
+        method: name of the row in tables; that of the folder when empty.
+        kind: as in ``METHODS``.
+        description: one line about the method.
+        fov_deg: horizontal degrees that the method saw at a time.
+        data: what the targets are.
+        parts: part of the data set that each target is from, by its name; if there are several,
+            each is scored by itself, too.
+        others: what was measured on the same targets for methods to compare with, by their names.
+        replicates: bootstrap resamples of the scenes for the 95 % intervals.
+        seed: of the resampling.
+
+    Raises:
+        ValueError: another method was measured on other targets.
+        OSError: a file cannot be read.
+    """
+    records, names = measured.records, measured.names
+    for name, other in others.items():
+        if other.names != names:
+            raise ValueError(f"{name}: was measured on other targets")
 
     def metrics(chosen: Sequence[SceneRecords]) -> dict[str, Measured]:
         at_recall = {level: records_at_recall(chosen, level) for level in RECALL_LEVELS}
@@ -111,7 +196,7 @@ def score_folder(
 
     return ScoreFile(
         panoscene=__version__,
-        method=method or predictions.name,
+        method=method or measured.predictions.name,
         kind=kind,
         description=description,
         fov_deg=fov_deg,
@@ -119,14 +204,18 @@ def score_folder(
         scenes=len(records),
         objects=sum(record.targets for record in records),
         missing=sum(record.missing for record in records),
-        invalid=sum(some.invalid for some in measured),
-        targets_hash=_hash(targets, names),
-        predictions_hash=_hash(predictions, names),
+        invalid=measured.invalid,
+        targets_hash=_hash(measured.targets, names),
+        predictions_hash=_hash(measured.predictions, names),
         replicates=replicates,
         seed=seed,
         metrics=metrics(records),
         categories=pooled_categories(records),
         parts={name: metrics(some) for name, some in _by_part(records, names, parts).items()},
+        differences={
+            name: pooled_differences(records, other.records, replicates=replicates, seed=seed)
+            for name, other in others.items()
+        },
     )
 
 

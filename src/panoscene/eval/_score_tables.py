@@ -104,9 +104,9 @@ SEMANTIC: tuple[Column, ...] = (
     *(_percent(label, f"semantic.{label}", interval=False) for label in PANOCONTEXT_12),
 )
 SHAPE: tuple[Column, ...] = (
-    Column("targets", "shape.targets", digits=0),
-    Column("found", "shape.matched", digits=0),
-    Column("as boxes", "shape.boxes_stand_in", digits=0),
+    Column("targets", "shape.targets", interval=False, digits=0),
+    Column("found", "shape.matched", interval=False, digits=0),
+    Column("as boxes", "shape.boxes_stand_in", interval=False, digits=0),
     Column("Chamfer, found", "shape.canonical.chamfer"),
     _percent("F-score, found", "shape.canonical.f_score"),
     _percent("F-score", "shape.canonical_with_misses.f_score"),

@@ -1,55 +1,15 @@
-"""Shape scores: object by object in canonical space and in the world, misses not forgiven."""
+"""Shape scores: means over the objects of scenes, misses not forgiven."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import torch
-from jaxtyping import Int64
-from torch import Tensor
+import numpy as np
+from jaxtyping import Float
 
-from panoscene.eval._matching import match_objects
-from panoscene.eval._shape_errors import (
-    SHAPE_POINTS,
-    SHAPE_THRESHOLD,
-    ShapeErrors,
-    missed_shape,
-    shape_errors,
-)
-from panoscene.scene import Mesh, Objects, Scene, object_mesh, place_vertices
-
-WORLD_THRESHOLD = 0.05
-"""Metres within which surfaces agree in the world, where the error of the box counts too."""
-
-
-@dataclass(frozen=True, slots=True)
-class ShapePair:
-    """The errors of one predicted object and the target that it was matched with."""
-
-    prediction: int
-    target: int
-    canonical: ShapeErrors
-    """In canonical space: both meshes centred and scaled, per axis, to the unit box. Lengths are
-    parts of the box."""
-    world: ShapeErrors
-    """In metres, both meshes in their boxes."""
-    box_stands_in: bool
-    """The prediction had no mesh, so its box was its shape."""
-
-
-@dataclass(frozen=True, slots=True)
-class ShapeRecord:
-    """The shape measures of one scene."""
-
-    name: str
-    pairs: tuple[ShapePair, ...]
-    """Of every target with a mesh that was found."""
-    missed: tuple[ShapeErrors, ...]
-    """Of every target with a mesh that was not."""
-    targets_without_mesh: int
-    """Targets whose shape is not known; they do not count."""
-    scene: ShapeErrors | None = None
-    """Of all objects of the scene as one mesh, in metres, when that was asked for."""
+from panoscene.eval._plausibility import ratio
+from panoscene.eval._shape_errors import ShapeErrors
+from panoscene.eval._shape_records import ShapeRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,98 +46,6 @@ class ShapeScores:
     scene: ShapeMeans
 
 
-def canonical_mesh(mesh: Mesh) -> Mesh:
-    """Return a mesh moved and scaled, axis by axis, so that it fills [-1/2, 1/2]^3.
-
-    An axis along which the mesh is flat is only moved.
-
-    Source: placement of shapes in the authors' release.
-
-    Examples:
-        >>> from panoscene.scene import box_mesh
-        >>> box = box_mesh()
-        >>> canonical_mesh(Mesh(box.vertices * 3 + 1, box.faces)).vertices.amax(0)
-        tensor([0.5000, 0.5000, 0.5000])
-    """
-    low, high = mesh.vertices.amin(0), mesh.vertices.amax(0)
-    extent = high - low
-    scale = torch.where(extent > 0, extent, 1.0)
-    return Mesh((mesh.vertices - (low + high) / 2) / scale, mesh.faces)
-
-
-def shape_record(
-    prediction: Scene | None,
-    target: Scene,
-    *,
-    generator: torch.Generator,
-    match: Int64[Tensor, " n"] | None = None,
-    points: int = SHAPE_POINTS,
-    threshold: float = SHAPE_THRESHOLD,
-    world_threshold: float = WORLD_THRESHOLD,
-    scene_points: int = 0,
-) -> ShapeRecord:
-    """Return the shape measures of one scene.
-
-    Args:
-        prediction: What was predicted; None for a missing one.
-        target: The true scene; objects without a mesh are left out and counted.
-        generator: Source of the samples.
-        match: Target of each predicted object, or -1; by default that of ``match_objects``.
-        points: Samples of each surface of an object.
-        threshold: Of the F-score in canonical space, a part of the box.
-        world_threshold: Of the F-score in the world, in metres.
-        scene_points: Samples of the surface of all objects together (the paper takes 100,000);
-            0 leaves that measure out. Objects without a mesh take part as boxes there.
-
-    Raises:
-        ValueError: ``match`` is not one number for each predicted object, or out of range.
-    """
-    count = len(target.objects.boxes)
-    known = [k for k in range(count) if _has_mesh(target.objects, k)]
-    targets = _checked_match(prediction, target, match)
-    pairs: list[ShapePair] = []
-    for number, partner in enumerate(targets):
-        if prediction is None or partner not in known:
-            continue
-        own, true = object_mesh(prediction.objects, number), object_mesh(target.objects, partner)
-        own, true = canonical_mesh(own), canonical_mesh(true)
-        pairs.append(
-            ShapePair(
-                prediction=number,
-                target=partner,
-                canonical=shape_errors(
-                    own, true, generator=generator, points=points, threshold=threshold
-                ),
-                world=shape_errors(
-                    _placed(own, prediction.objects, number),
-                    _placed(true, target.objects, partner),
-                    generator=generator,
-                    points=points,
-                    threshold=world_threshold,
-                ),
-                box_stands_in=not _has_mesh(prediction.objects, number),
-            )
-        )
-    missed = set(known) - {pair.target for pair in pairs}
-    scene = None
-    if scene_points and count:
-        scene = shape_errors(
-            _merged(prediction.objects) if prediction else _nothing(),
-            _merged(target.objects),
-            generator=generator,
-            points=scene_points,
-            threshold=world_threshold,
-            volume=False,
-        )
-    return ShapeRecord(
-        name=target.name,
-        pairs=tuple(pairs),
-        missed=tuple(missed_shape(object_mesh(target.objects, k)) for k in sorted(missed)),
-        targets_without_mesh=count - len(known),
-        scene=scene,
-    )
-
-
 def score_shapes(records: Sequence[ShapeRecord]) -> ShapeScores:
     """Return mean shape errors over all objects of all scenes.
 
@@ -185,76 +53,69 @@ def score_shapes(records: Sequence[ShapeRecord]) -> ShapeScores:
         >>> score_shapes([]).targets
         0
     """
-    pairs = [pair for record in records for pair in record.pairs]
-    missed = [errors for record in records for errors in record.missed]
-    canonical, world = [pair.canonical for pair in pairs], [pair.world for pair in pairs]
+    return shapes_of_sums(shape_sums(records).sum(axis=0))
+
+
+def shape_sums(records: Sequence[ShapeRecord | None]) -> Float[np.ndarray, "scenes columns"]:
+    """Return for each scene what adds up to the scores; zeros where nothing was measured."""
+    rows = [np.zeros(_COLUMNS) if record is None else _sums(record) for record in records]
+    return np.array(rows, dtype=np.float64).reshape(-1, _COLUMNS)
+
+
+def shapes_of_sums(sums: Float[np.ndarray, " columns"]) -> ShapeScores:
+    """Return ``score_shapes`` for added rows of ``shape_sums``."""
+    counts, means = sums[: len(_COUNTS)].tolist(), sums[len(_COUNTS) :].reshape(len(_MEANS), -1)
     return ShapeScores(
-        targets=len(pairs) + len(missed),
-        matched=len(pairs),
-        boxes_stand_in=sum(pair.box_stands_in for pair in pairs),
-        targets_without_mesh=sum(record.targets_without_mesh for record in records),
-        canonical=_means(canonical),
-        canonical_with_misses=_means(canonical + missed),
-        world=_means(world),
-        world_with_misses=_means(world + missed),
-        scene=_means([record.scene for record in records if record.scene]),
+        **{name: round(count) for name, count in zip(_COUNTS, counts, strict=True)},
+        **{name: _mean(row) for name, row in zip(_MEANS, means, strict=True)},
     )
 
 
-def _means(errors: list[ShapeErrors]) -> ShapeMeans:
+_COUNTS = ("targets", "matched", "boxes_stand_in", "targets_without_mesh")
+_MEANS = ("canonical", "canonical_with_misses", "world", "world_with_misses", "scene")
+_SUMS = 8
+"""Of one mean: shapes, those at a distance that is finite, five errors, closed targets."""
+_COLUMNS = len(_COUNTS) + _SUMS * len(_MEANS)
+
+
+def _sums(record: ShapeRecord) -> Float[np.ndarray, " columns"]:
+    pairs, missed = record.pairs, list(record.missed)
+    canonical, world = [pair.canonical for pair in pairs], [pair.world for pair in pairs]
+    counts = (
+        len(pairs) + len(missed),
+        len(pairs),
+        sum(pair.box_stands_in for pair in pairs),
+        record.targets_without_mesh,
+    )
+    scene = [record.scene] if record.scene else []
+    groups = (canonical, canonical + missed, world, world + missed, scene)
+    return np.concatenate([counts, *map(_error_sums, groups)])
+
+
+def _error_sums(errors: Sequence[ShapeErrors]) -> tuple[float, ...]:
     finite = [one for one in errors if math.isfinite(one.chamfer)]
     volumes = [one.volume_iou for one in errors if one.volume_iou is not None]
-    return ShapeMeans(
-        shapes=len(errors),
-        infinite=len(errors) - len(finite),
-        chamfer=_mean([one.chamfer for one in finite]),
-        mean_distance=_mean([one.mean_distance for one in finite]),
-        f_score=_mean([one.f_score for one in errors]),
-        normal_consistency=_mean([one.normal_consistency for one in errors]),
-        volume_iou=_mean(volumes),
-        volumes=len(volumes),
+    return (
+        float(len(errors)),
+        float(len(finite)),
+        math.fsum(one.chamfer for one in finite),
+        math.fsum(one.mean_distance for one in finite),
+        math.fsum(one.f_score for one in errors),
+        math.fsum(one.normal_consistency for one in errors),
+        math.fsum(volumes),
+        float(len(volumes)),
     )
 
 
-def _mean(values: list[float]) -> float | None:
-    return math.fsum(values) / len(values) if values else None
-
-
-def _checked_match(
-    prediction: Scene | None, target: Scene, match: Int64[Tensor, " n"] | None
-) -> list[int]:
-    if prediction is None:
-        return []
-    if match is None:
-        match = match_objects(prediction.objects, target.objects)
-    found: list[int] = match.tolist()
-    count, others = len(prediction.objects.boxes), len(target.objects.boxes)
-    if len(found) != count or any(not -1 <= index < others for index in found):
-        raise ValueError(f"match: expected {count} numbers from -1 to {others - 1}, found {found}")
-    matched = [index for index in found if index >= 0]
-    if len(set(matched)) < len(matched):
-        raise ValueError(f"match: expected each target once at most, found {found}")
-    return found
-
-
-def _has_mesh(objects: Objects, index: int) -> bool:
-    mesh = objects.shapes.mesh[index] if objects.shapes.mesh else None
-    return mesh is not None and len(mesh.faces) > 0
-
-
-def _placed(mesh: Mesh, objects: Objects, index: int) -> Mesh:
-    return Mesh(place_vertices(mesh.vertices, objects.boxes[index]), mesh.faces)
-
-
-def _nothing() -> Mesh:
-    return Mesh(torch.zeros(0, 3), torch.zeros(0, 3, dtype=torch.int64))
-
-
-def _merged(objects: Objects) -> Mesh:
-    """Return all objects as one mesh in the world frame."""
-    merged = _nothing()
-    for index in range(len(objects.boxes)):
-        one = _placed(canonical_mesh(object_mesh(objects, index)), objects, index)
-        faces = torch.cat((merged.faces, one.faces + len(merged.vertices)))
-        merged = Mesh(torch.cat((merged.vertices.to(one.vertices), one.vertices)), faces)
-    return merged
+def _mean(sums: Float[np.ndarray, " sums"]) -> ShapeMeans:
+    shapes, finite, chamfer, distance, f_score, normals, volume, volumes = sums.tolist()
+    return ShapeMeans(
+        shapes=round(shapes),
+        infinite=round(shapes - finite),
+        chamfer=ratio(chamfer, finite),
+        mean_distance=ratio(distance, finite),
+        f_score=ratio(f_score, shapes),
+        normal_consistency=ratio(normals, shapes),
+        volume_iou=ratio(volume, volumes),
+        volumes=round(volumes),
+    )
