@@ -30,6 +30,7 @@ from panoscene.train._pose_scores import (
     category_scores,
     detection_scores,
     floor_box_objects,
+    matched_errors,
     paired_errors,
 )
 from panoscene.train._precompute import HEADER
@@ -104,8 +105,8 @@ def measure(data: Path, splits: Sequence[str], weights: Path, records: Path | No
     for name, predicted in objects.items():
         if len(predicted) == len(truth):
             rows[name] = detection_scores(predicted, truth)
-            if name not in UNPAIRED:
-                rows[name] |= paired_errors(predicted, truth)
+            errors = matched_errors if name in UNPAIRED else paired_errors
+            rows[name] |= errors(predicted, truth)
     area = category_scores(objects["true_room"], truth)[0]
     count = np.bincount(torch.cat([s.objects.category for s in truth]).numpy(), minlength=57)
     return {
@@ -144,7 +145,8 @@ def card(result: Mapping, weights: Path) -> str:
         "", "## Scores with true BFoVs", "",
         "AP is the standard mean over the categories present. True BFoVs all have the same score,",
         "so objects are ranked by the confidence in their distance; the first column leaves them",
-        "tied. Errors are medians over all objects. With the true layout the network knows more",
+        "tied. Errors are medians over all objects, or over those that a detection shows where",
+        "detections are the network's. With the true layout the network knows more",
         "than the baseline, which is given no room; without a layout, or with that of the layout",
         "network, the comparison is fair.", "",
         "| input | tied AP@0.15 | AP@0.15 | AP@0.25 | AP@0.5 | centre | distance | size | yaw"

@@ -213,11 +213,24 @@ def pose_text() -> dict[str, str]:
                 f" {_ranked(row)} | {turned} |"
             )
     rows = parts[1]["rows"]
-    found = ["| input | AP@0.15 | AP@0.25 | AP@0.5 |", "| --- " * 4 + "|"]
+    columns = ("AP@0.15", "AP@0.25", "AP@0.5", "centre", "distance", "size", "yaw")
+    found = [f"| input | {' | '.join((*columns, 'front for back'))} |", "| --- " * 9 + "|"]
     found += [
-        f"| {words} | {_ranked(rows[name])} |" for name, words in POSE_FOUND.items() if name in rows
+        f"| {words} | {_ranked(rows[name])} | {' | '.join(_pose_errors(rows[name]))} |"
+        for name, words in POSE_FOUND.items()
+        if name in rows
     ]
     return {"pose-parts": "\n".join(lines), "pose-found": "\n".join(found)}
+
+
+def _pose_errors(row: dict[str, float]) -> list[str]:
+    return [
+        f"{row['centre_error_m']:.2f} m",
+        f"{row['distance_error_m']:.2f} m",
+        f"{100 * row['size_error']:.0f} %",
+        f"{row['yaw_error_deg']:.0f}°",
+        f"{100 * row['front_back']:.0f} %",
+    ]
 
 
 def _ranked(row: dict[str, float]) -> str:

@@ -1,6 +1,7 @@
 """Training of the pose network."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,11 +17,23 @@ from panoscene.data import (
 )
 from panoscene.geometry import OrientedBoxes
 from panoscene.models.pose import CONFIGS, PoseOutput, build_pose, pose_losses
-from panoscene.scene import MEAN_SIZE, Layout, Panorama, Scene, objects_from_boxes
+from panoscene.scene import (
+    MEAN_SIZE,
+    Layout,
+    Panorama,
+    Scene,
+    objects_from_boxes,
+    select_objects,
+)
 from panoscene.synth.dataset import open_dataset
 from panoscene.train import TrainError, TrainRecipe, read_train_recipe
 from panoscene.train._pose import PoseOptions, PoseTask, fix_norms, freeze_layers, pose_task
-from panoscene.train._pose_scores import detection_scores, floor_box_objects, paired_errors
+from panoscene.train._pose_scores import (
+    detection_scores,
+    floor_box_objects,
+    matched_errors,
+    paired_errors,
+)
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "samples" / "synth"
@@ -149,3 +162,16 @@ def test_scores_of_the_truth_and_of_something_else() -> None:
     floor = floor_box_objects(truth.objects, MEAN_SIZE, 1.6)
     assert detection_scores([floor], [truth])["ap_50"] < 1.0
     assert paired_errors([floor], [truth])["centre_error_m"] > 0.0
+
+
+def test_errors_of_detections_are_those_of_what_they_show() -> None:
+    truth = scene()
+    swapped = select_objects(truth.objects, torch.tensor([1, 0]))
+    assert matched_errors([swapped], [truth]) == {
+        "shown": 1.0,
+        **paired_errors([truth.objects], [truth]),
+    }
+    elsewhere = replace(swapped, bfov=swapped.bfov * torch.tensor([[1.0], [0.0]]))
+    assert matched_errors([elsewhere], [truth])["shown"] == 0.5
+    none = select_objects(truth.objects, torch.zeros(0, dtype=torch.int64))
+    assert matched_errors([none], [truth]) == {"shown": 0.0}

@@ -9,9 +9,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from panoscene.data import match_detections
 from panoscene.eval import IOU_THRESHOLDS, detection_records, score_detection
 from panoscene.geometry import OrientedBoxes, direction_from_lonlat, wrap_angle
-from panoscene.scene import Objects, Scene
+from panoscene.scene import Detections, Objects, Scene, select_objects
 
 _FARTHEST = 12.0
 _LOWEST = 1e-3
@@ -100,6 +101,28 @@ def paired_errors(predicted: Sequence[Objects], truth: Sequence[Scene]) -> dict[
         "yaw_error_deg": float(yaw.median()),
         "front_back": float((yaw > 90).double().mean()),
     }
+
+
+def matched_errors(predicted: Sequence[Objects], truth: Sequence[Scene]) -> dict[str, float]:
+    """Return ``paired_errors`` of detections and the objects that they show.
+
+    Detections show objects by their BFoVs (``match_detections``), whatever their boxes, so two
+    methods that place the same detections answer for the same objects. ``shown`` is the share of
+    the detections that show one; without any there are no errors.
+    """
+    pairs: list[tuple[Objects, Scene]] = []
+    for objects, scene in zip(predicted, truth, strict=True):
+        seen = Detections(objects.bfov, objects.category, objects.score)
+        index = match_detections(seen, scene.objects)
+        shown = (index >= 0).nonzero().squeeze(1)
+        chosen = select_objects(scene.objects, index[shown])
+        pairs.append((select_objects(objects, shown), replace(scene, objects=chosen)))
+    count = sum(len(objects.category) for objects in predicted)
+    shown_count = sum(len(objects.category) for objects, _ in pairs)
+    if not shown_count:
+        return {"shown": 0.0}
+    errors = paired_errors([found for found, _ in pairs], [true for _, true in pairs])
+    return {"shown": shown_count / count} | errors
 
 
 def category_scores(
