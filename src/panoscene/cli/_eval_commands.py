@@ -13,13 +13,13 @@ from panoscene.cli._options import (
     Flag,
     OptionalCount,
     OptionalFile,
+    OptionalFolder,
     OptionalOutput,
     Output,
 )
 
 Targets = Annotated[str | None, arg(metavar="FOLDER", help_behavior_hint="")]
 Names = Annotated[str | None, arg(metavar="NAME,NAME", help_behavior_hint="")]
-OptionalFolder = Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")]
 
 
 def export(

@@ -51,6 +51,7 @@ OptionalOutput = Annotated[
     Path | None, arg(aliases=("-o",), metavar="OUT", help_behavior_hint=""), _PLACE
 ]
 OptionalFile = Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")]
+OptionalFolder = Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")]
 SceneFile = Annotated[Positional[Path], arg(metavar="SCENE")]
 Count = Annotated[int, arg(metavar="N"), _WHOLE]
 OptionalCount = Annotated[int | None, arg(metavar="N", help_behavior_hint=""), _WHOLE]

@@ -12,7 +12,7 @@ from tyro.conf import Positional, arg
 from panoscene._editions import Edition
 from panoscene.cli._artist import artist
 from panoscene.cli._errors import InputError
-from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFile, Output
+from panoscene.cli._options import Count, Flag, Number, OptionalCount, OptionalFolder, Output
 from panoscene.cli._synth_commands import Address
 from panoscene.cli._weight_files import check_weights
 
@@ -34,7 +34,7 @@ def reconstruct(
     output: Output,
     camera_height: Number = 1.6,
     edition: Edition = "compact",
-    weights: OptionalFile = None,
+    weights: OptionalFolder = None,
     device: Annotated[str, arg(metavar="NAME")] = "cpu",
     steps: OptionalCount = None,
     resolution: Count = 64,
