@@ -1,6 +1,7 @@
 """Pictures and labels of the small home, against geometry computed another way."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from panoscene.synth.render import (
     sample_light,
 )
 from panoscene.synth.render._lamps import LUMINANCE, lamps_of
+from panoscene.synth.render._tracer import Tracer
 
 pytestmark = pytest.mark.render
 # pictures of one size and number of samples share their machine code, which takes seconds to make
@@ -228,3 +230,21 @@ def test_light_in_a_closed_box_keeps_its_energy(renderer: Renderer, closed_box):
     mean = (irradiance * area).sum() / area.sum()
     flux = lamps_of(box, light).flux.sum() / 1000
     assert mean == pytest.approx(flux / (2 * 16 + 4 * 12) / (1 - albedo), rel=0.03)
+
+
+def test_rays_that_are_nowhere_read_the_table_of_rooms_where_it_is(renderer: Renderer) -> None:
+    mi, dr = renderer._engine.mi, renderer._engine.dr
+    rooms = np.arange(100, 112, dtype=np.uint32)  # four columns, three rows
+    tracer = SimpleNamespace(
+        engine=renderer._engine,
+        columns=dr.opaque(mi.UInt32, 4),
+        rows=dr.opaque(mi.UInt32, 3),
+        origin=[dr.opaque(mi.Float, -1.0), dr.opaque(mi.Float, -1.0)],
+        per_metre=2.0,
+        cells=mi.UInt32(rooms),
+    )
+    nan, far = float("nan"), 1e30
+    place = mi.Point3f([0.2, nan, 0.2, nan, far, -far], [0.2, 0.2, nan, nan, far, -far], [0] * 6)
+    found = np.array(Tracer._room_of(tracer, place))
+    assert found[[0, 4, 5]].tolist() == [110, 111, 100]
+    assert np.isin(found, rooms).all()

@@ -1,16 +1,13 @@
 """Renders what is left of a data set, with several processes."""
 
-import multiprocessing
-import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from panoscene._workers import in_processes, outcome
 from panoscene.synth.dataset import (
     DatasetIndex,
     HomeJob,
@@ -96,11 +93,10 @@ def render_dataset(
     """
     tasks, progress = begin_run(root, recipe, cache, limit=limit, extra=extra, threads=1)
     if processes == 1:
-        finished = ((task, _result(lambda task=task: render_home(task))) for task in tasks)
+        alone = ((task, outcome(lambda task=task: render_home(task))) for task in tasks)
+        return follow(Path(root), alone, progress, told)
+    with closing(in_processes(render_home, tasks, processes)) as finished:
         return follow(Path(root), finished, progress, told)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, context, initializer=_begin_worker) as pool:
-        return follow(Path(root), _in_order(pool, tasks, 2 * processes), progress, told)
 
 
 def begin_run(
@@ -167,45 +163,3 @@ def _models(cache: Path, texture_size: int) -> Models:
 @lru_cache(maxsize=1)
 def _renderer(threads: int) -> Renderer:
     return Renderer(threads)
-
-
-def _in_order(
-    pool: ProcessPoolExecutor, tasks: list[RenderTask], ahead: int
-) -> Iterator[tuple[RenderTask, str | None]]:
-    """Return tasks as they finish; only a few wait in the queue, so that stopping is quick."""
-    waiting: dict[Future[None], RenderTask] = {}
-    left = iter(tasks)
-    try:
-        while True:
-            for task in left:
-                waiting[pool.submit(render_home, task)] = task
-                if len(waiting) >= ahead:
-                    break
-            if not waiting:
-                return
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                yield waiting.pop(future), _result(future.result)
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _result(call: Callable[[], None]) -> str | None:
-    """Return why a home could not be made, or None when it was."""
-    try:
-        call()
-    except ValueError as error:
-        return str(error)
-    return None
-
-
-def _begin_worker() -> None:
-    """Let the parent process decide what Ctrl-C means, and end when it is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(2.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

@@ -391,10 +391,10 @@ class Tracer:
 
     def _room_of(self, place: Any) -> Any:
         mi, dr = self.engine.mi, self.engine.dr
-        column = mi.UInt32(
-            dr.clip((place.x - self.origin[0]) * self.per_metre, 0, mi.Float(self.columns) - 1)
-        )
-        row = mi.UInt32(
-            dr.clip((place.y - self.origin[1]) * self.per_metre, 0, mi.Float(self.rows) - 1)
-        )
+        last_column, last_row = self.columns - 1, self.rows - 1
+        across = dr.clip((place.x - self.origin[0]) * self.per_metre, 0, mi.Float(last_column))
+        along = dr.clip((place.y - self.origin[1]) * self.per_metre, 0, mi.Float(last_row))
+        # rays that meet nothing are nowhere: NaN passes the clip, and would read beyond the table
+        column = dr.minimum(mi.UInt32(across), last_column)
+        row = dr.minimum(mi.UInt32(along), last_row)
         return dr.gather(mi.UInt32, self.cells, row * self.columns + column)
