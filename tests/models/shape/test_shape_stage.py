@@ -181,6 +181,40 @@ def test_turning_the_panorama_changes_no_shape(network: ShapeNetwork) -> None:
     torch.testing.assert_close(after, before, atol=2e-4, rtol=1e-3)
 
 
+def test_the_number_of_threads_changes_nothing(network: ShapeNetwork) -> None:
+    stage = ShapeStage(network)
+    image = torch.rand(3, 64, 128, generator=torch.Generator().manual_seed(2))
+    count = 23
+    some = objects([0.25 * number for number in range(count)], [[0.7, 0.6, 0.9]] * count)
+    threads = torch.get_num_threads()
+    found = []
+    try:
+        for number in (1, 3):
+            torch.set_num_threads(number)
+            found.append(stage.codes(image, some))
+            assert torch.get_num_threads() == number
+    finally:
+        torch.set_num_threads(threads)
+    assert found[0].shape == (count, TINY.code)
+    torch.testing.assert_close(found[0], found[1], atol=0, rtol=0)
+
+
+def test_the_stage_is_the_network_without_norms(tmp_path: Path) -> None:
+    network = build_shape(CONFIGS["compact"])
+    image = torch.rand(3, 64, 128, generator=torch.Generator().manual_seed(3))
+    for module in network.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            torch.nn.init.uniform_(module.bias, 0, 0.2, generator=torch.Generator().manual_seed(4))
+    path = tmp_path / "shape.safetensors"
+    write_weights(path, network, WeightsHeader(stage="shape", edition="compact"))
+    stage = load_shape_stage("compact", path)
+    assert not any(isinstance(part, torch.nn.BatchNorm2d) for part in stage.network.modules())
+    some = objects([0.2, -1.0], [[0.6, 0.6, 0.9], [1.0, 0.5, 0.7]])
+    plain = ShapeStage(network).codes(image, some)
+    away = (stage.codes(image, some) - plain).abs().max()
+    assert float(away) < 0.01 * float(plain.std())
+
+
 def test_weights_are_read_and_others_refused(network: ShapeNetwork, tmp_path: Path) -> None:
     path = tmp_path / "tiny.safetensors"
     write_weights(path, network, WeightsHeader(stage="shape", edition="compact"))

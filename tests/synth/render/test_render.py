@@ -2,6 +2,7 @@
 
 import dataclasses
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -245,6 +246,6 @@ def test_rays_that_are_nowhere_read_the_table_of_rooms_where_it_is(renderer: Ren
     )
     nan, far = float("nan"), 1e30
     place = mi.Point3f([0.2, nan, 0.2, nan, far, -far], [0.2, 0.2, nan, nan, far, -far], [0] * 6)
-    found = np.array(Tracer._room_of(tracer, place))
+    found = np.array(Tracer._room_of(cast("Tracer", tracer), place))
     assert found[[0, 4, 5]].tolist() == [110, 111, 100]
     assert np.isin(found, rooms).all()

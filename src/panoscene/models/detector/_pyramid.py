@@ -6,10 +6,10 @@ from pathlib import Path
 import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
-from torch.nn.utils.fusion import fuse_conv_bn_weights
 
-from panoscene.models._backbone import Backbone, build_backbone
+from panoscene.models._backbone import build_backbone
 from panoscene.models._circular import make_circular
+from panoscene.models._folding import fold_norms
 
 from ._config import DetectorConfig
 
@@ -71,40 +71,3 @@ class Pyramid(nn.Module):
                 module.eval()
                 module.requires_grad_(False)
         return self
-
-
-def fold_norms(backbone: Backbone) -> None:
-    """Make each batch normalisation part of the convolution whose output it takes, in place.
-
-    The function computed in inference mode stays the same; the normalisations are gone.
-
-    Raises:
-        ValueError: A normalisation does not take the output of a convolution without bias.
-    """
-    pairs = _convolutions_before_norms(backbone)
-    for name, norm in list(backbone.named_modules()):
-        if not isinstance(norm, nn.BatchNorm2d):
-            continue
-        conv = pairs.get(name)
-        mean, variance = norm.running_mean, norm.running_var
-        if conv is None or conv.bias is not None or mean is None or variance is None:
-            raise ValueError(f"backbone: {name} does not follow a convolution without bias")
-        conv.weight, conv.bias = fuse_conv_bn_weights(
-            conv.weight, None, mean, variance, norm.eps, norm.weight, norm.bias
-        )
-        conv.bias.requires_grad_(True)
-        backbone.set_submodule(name, getattr(norm, "act", nn.Identity()))
-
-
-def _convolutions_before_norms(backbone: Backbone) -> dict[str, nn.Conv2d]:
-    """Return the convolution before each normalisation: all backbones list them so."""
-    pairs: dict[str, nn.Conv2d] = {}
-    last: nn.Conv2d | None = None
-    for name, module in backbone.named_modules():
-        if isinstance(module, nn.Conv2d):
-            last = module
-        elif isinstance(module, nn.BatchNorm2d):
-            if last is not None and last.out_channels == module.num_features:
-                pairs[name] = last
-            last = None
-    return pairs

@@ -47,6 +47,8 @@ class _Tables:
     """Nodes of each part."""
     cells: Int64[Tensor, "8 8"]
     """Cells of each part."""
+    eighth: Int64[Tensor, " 64"]
+    """The part that each cell comes of."""
     corners: Int64[Tensor, "8 8"]
     """Nodes, of the 27, of each of the eight cells of a part."""
     steps: Int64[Tensor, "8 3"]
@@ -80,8 +82,9 @@ def first_blocks(values: Float[Tensor, "n n n"], error: Float[Tensor, "c c c"]) 
     cases = cell_cases(wide < 0)
     sides = values.new_ones((count * CELLS + 2,) * 3, dtype=torch.int8)
     _mark(sides, place, cases)
-    some = mixed(cases).any(1)
-    return Blocks(wide[some], cases[some], error.flatten(3).flatten(0, 2)[some], place[some], sides)
+    some = numbers_of(mixed(cases).any(1))
+    error = error.flatten(3).flatten(0, 2)
+    return Blocks(*(part.index_select(0, some) for part in (wide, cases, error, place)), sides)
 
 
 def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> Blocks:
@@ -114,8 +117,7 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
     if not last:
         away = _columns((found - guess).abs_(), tables.parts).amax(1).t()
         error = torch.where(rough, away / GAIN, known)
-    order = tables.cells.flatten().argsort()
-    error = error.repeat_interleave(8, 1).index_select(1, order)
+    error = error.index_select(1, tables.eighth)
 
     index = _flat(2 * place, tables.around, len(blocks.sides))
     side = at(blocks.sides, index).to(values) @ tables.touching
@@ -145,7 +147,8 @@ def _exact(
 ) -> Float[Tensor, "blocks 125"]:
     """Return values of a grid after those in rough cells have been made exact."""
     wanted = torch.zeros_like(grid.values, dtype=torch.bool)
-    wanted.index_fill_(0, grid.index[rough.to(grid.values) @ tables.fresh > 0], True)
+    fresh = numbers_of(rough.to(grid.values) @ tables.fresh > 0)
+    wanted.index_fill_(0, at(grid.index, fresh), True)
     own = grid.index.index_select(1, tables.own)
     # block after block: points that come one after the other are close together
     place = at(own, numbers_of(at(wanted, own)))
@@ -199,6 +202,7 @@ def _tables(device: torch.device) -> _Tables:
     found = _Tables(
         parts=_flat(2 * halves, places(3), _NODES),
         cells=_flat(2 * halves, halves, CELLS),
+        eighth=_flat(torch.zeros(1, 3, dtype=torch.int64), places(CELLS) // 2, 2)[0],
         corners=_flat(halves, halves, 3),
         steps=halves,
         nodes=nodes,

@@ -1,6 +1,5 @@
 """Surfaces of fields: marching cubes on grids that are fine only near the surface."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 
@@ -9,7 +8,6 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from scipy import ndimage
 from torch import Tensor
-from torch.nn import functional as F
 
 from panoscene.scene import Mesh
 
@@ -20,6 +18,7 @@ from ._fast_field import FastField, fast_field
 from ._fewer import fewer_faces, simplified
 from ._network import ShapeNetwork
 from ._quads import gathered_surface
+from ._threads import alone, side_by_side
 
 COARSEST = 16
 """Cells along each axis of the grid that is evaluated everywhere."""
@@ -69,21 +68,17 @@ def extract_meshes(
         raise ValueError(f"resolution: found {resolution}, expected 32, 64, 128 or 256")
     if len(code) == 0:
         return ()
-    field = fast_field(network, network.elements(code))
     config = network.config
 
     @torch.inference_mode()
     def surface(index: int) -> Mesh | None:
         return _surface(_Shape(field, index, config.reach), config, resolution, most)
 
-    threads = torch.get_num_threads()
-    if len(code) == 1 or threads == 1:
-        return tuple(surface(index) for index in range(len(code)))
-    # each works alone: threads that help one another on small tensors mostly wait
-    with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
-        found = tuple(pool.map(surface, range(len(code))))
-    torch.set_num_threads(threads)  # what new threads begin with is one number for all
-    return found
+    with alone() as threads:
+        field = fast_field(network, network.elements(code))
+        if len(code) > 1:
+            return side_by_side(surface, range(len(code)), threads)
+    return (surface(0),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +112,10 @@ class _Shape:
     def on(self, cells: int, number: Int64[Tensor, " n"]) -> Float[Tensor, " n"]:
         """Return the field at some nodes of a grid."""
         nodes = cells + 1
-        ticks = torch.stack((number // (nodes * nodes), number // nodes % nodes, number % nodes), 1)
+        number = number.int()  # divided in half the time
+        line = number // nodes
+        plane = line // nodes
+        ticks = torch.stack((plane, line - plane * nodes, number - line * nodes), 1)
         return self.field(self.index, at(self.axis(nodes), ticks))
 
     def near(self, guess: Float[Tensor, "m m m"], levels: tuple[float, ...]) -> _Grid:
@@ -138,14 +136,16 @@ class _Shape:
 def _surface(shape: _Shape, config: ShapeConfig, resolution: int, most: int | None) -> Mesh | None:
     guess = shape.everywhere()
     grid = shape.near(guess, _LEVELS[:1])
-    level, fitted = _level(grid.values, config)
+    level, fitted, values = _level(grid.values, config)
     if not fitted:
         # the choice of another level needs exact values around all of them
         grid = shape.near(guess, _LEVELS)
-        level, fitted = _level(grid.values, config)
-    values = _solid(grid.values, level)
-    moved = _most_of((values != grid.values - level).to(values))
-    blocks = first_blocks(values, torch.where(_each_twice(moved) > 0, torch.inf, grid.error))
+        level, fitted, values = _level(grid.values, config)
+    error = grid.error
+    moved = values != grid.values - level
+    if bool(moved.any()):
+        error = torch.where(_each_twice(_most_of(moved.to(values))) > 0, torch.inf, error)
+    blocks = first_blocks(values, error)
     if len(blocks.place) == 0:
         return None
     cells = len(grid.error)
@@ -169,7 +169,7 @@ def _mesh(blocks: Blocks, count: int, most: int | None) -> Mesh:
     """Return the surface with about that many triangles; vertices in cells from the corner."""
     parts = blocks.values, blocks.cases, blocks.place, count
     # of marching cubes, a cell has two triangles
-    if most is not None and int(mixed(blocks.cases).sum()) > most / 2:
+    if most is not None and int(mixed(blocks.cases).count_nonzero()) > most / 2:
         found = simplified(*gathered_surface(*parts, least=most), most)
         if found is not None:
             return Mesh(torch.from_numpy(found[0]).float(), torch.from_numpy(found[1]))
@@ -192,10 +192,7 @@ def _by_place(nodes: int, device: torch.device) -> Int64[Tensor, " n"]:
 def _between(values: Float[Tensor, "n n n"]) -> Float[Tensor, "m m m"]:
     """Return values on twice as many cells, on parabolas through three nodes, axis by axis."""
     for axis in range(3):
-        parts = [values.narrow(axis, first, values.shape[axis] - 2) for first in range(3)]
-        even = [slice(None)] * 3
-        even[axis] = slice(None, None, 2)
-        first, middle, last = (part[tuple(even)] for part in parts)
+        first, middle, last = _threes(values, axis)
         after = torch.add(first, last, alpha=-1 / 3).mul_(0.375).add_(middle, alpha=0.75)
         before = torch.add(last, first, alpha=-1 / 3).mul_(0.375).add_(middle, alpha=0.75)
         rows = torch.stack((first, after, middle, before), axis + 1).flatten(axis, axis + 1)
@@ -204,9 +201,20 @@ def _between(values: Float[Tensor, "n n n"]) -> Float[Tensor, "m m m"]:
     return values
 
 
+def _threes(values: Float[Tensor, "x y z"], axis: int) -> list[Float[Tensor, "p q r"]]:
+    """Return the first, middle and last nodes of all two cells along an axis."""
+    even = [slice(None)] * 3
+    even[axis] = slice(None, None, 2)
+    parts = [values.narrow(axis, first, values.shape[axis] - 2) for first in range(3)]
+    return [part[tuple(even)] for part in parts]
+
+
 def _most_of(values: Float[Tensor, "n n n"]) -> Float[Tensor, "c c c"]:
     """Return the greatest of the 27 values in each two by two by two cells."""
-    return F.max_pool3d(values[None, None], 3, 2)[0, 0]
+    for axis in range(3):
+        first, middle, last = _threes(values, axis)
+        values = torch.maximum(torch.maximum(first, middle), last)
+    return values
 
 
 def _each_twice(cells: Float[Tensor, "c c c"]) -> Float[Tensor, "d d d"]:
@@ -216,26 +224,26 @@ def _each_twice(cells: Float[Tensor, "c c c"]) -> Float[Tensor, "d d d"]:
     return wide.reshape(count, count, count)
 
 
-def _level(values: Float[Tensor, "n n n"], config: ShapeConfig) -> tuple[float, bool]:
-    """Return the value on the surface, and whether the mesh is to be fitted to the box.
+def _level(
+    values: Float[Tensor, "n n n"], config: ShapeConfig
+) -> tuple[float, bool, Float[Tensor, "n n n"]]:
+    """Return the value on the surface, whether the mesh is to be fitted to the box, and the solid.
 
     A shape touches all sides of its box. Where the network works in the box and is so unsure of
     legs that none are left, a level nearer to 0 brings them back.
     """
     if config.frame == "longest":
-        return ISO_LEVEL, True
+        return ISO_LEVEL, True, _solid(values, ISO_LEVEL)[0]
     step = 2 * config.reach / (len(values) - 1)
-    best, most = ISO_LEVEL, 0.0
+    best, most, kept = ISO_LEVEL, 0.0, None
     for level in _LEVELS:
-        inside = _solid(values, level) < 0
-        if bool(inside.any()):
-            low, high = _bounds(inside)
-            share = min(stop - start - 2 for start, stop in zip(low, high, strict=True)) * step
-            if share >= _FILLED:
-                return level, True
-            if share > most + step:
-                best, most = level, share
-    return best, False
+        solid, nodes = _solid(values, level)
+        share = nodes * step
+        if share >= _FILLED:
+            return level, True, solid
+        if kept is None or share > most + step:
+            best, most, kept = level, share, solid
+    return best, False, values if kept is None else kept
 
 
 def _close(values: Float[Tensor, "n n n"]) -> None:
@@ -245,19 +253,30 @@ def _close(values: Float[Tensor, "n n n"]) -> None:
             values.select(axis, end).clamp_(min=_OUTSIDE)
 
 
-def _solid(values: Float[Tensor, "n n n"], level: float) -> Float[Tensor, "n n n"]:
-    """Return the field less a level, closed, and with small loose pieces taken out."""
+def _solid(values: Float[Tensor, "n n n"], level: float) -> tuple[Float[Tensor, "n n n"], int]:
+    """Return the field less a level, closed, and with small loose pieces taken out.
+
+    The other number is how many nodes are inside along the axis along which they are the fewest.
+    """
     values = values - level
     _close(values)
     inside = (values < 0).cpu().numpy()
-    label = np.zeros(inside.shape, np.int32)
-    ndimage.label(inside, np.ones((3, 3, 3), bool), output=label)
-    size = np.bincount(label.ravel())
-    size[0] = 0
-    crumb = inside & (size < _CRUMB * size.sum())[label]
-    if not crumb.any():
-        return values
-    return torch.where(torch.from_numpy(crumb).to(values.device), values.abs() + 1e-6, values)
+    bounds = _bounds(inside)
+    if bounds is None:
+        return values, 0
+    label = np.zeros([part.stop - part.start for part in bounds], np.int32)
+    count = ndimage.label(inside[bounds], np.ones((3, 3, 3), bool), output=label)
+    if count > 1:
+        size = np.bincount(label.ravel())
+        size[0] = 0
+        crumb = inside[bounds] & (size < _CRUMB * size.sum())[label]
+        if crumb.any():
+            part = values[bounds]
+            some = torch.from_numpy(crumb).to(values.device)
+            part.copy_(torch.where(some, part.abs() + 1e-6, part))
+            inside[bounds] &= ~crumb
+            bounds = _bounds(inside) or bounds
+    return values, min(part.stop - part.start for part in bounds)
 
 
 def _extremes(
@@ -288,17 +307,10 @@ def _nodes_of(cells: Bool[Tensor, "m m m"], nodes: int) -> Bool[Tensor, "n n n"]
     return found
 
 
-def _bounds(inside: Bool[Tensor, "n n n"]) -> tuple[list[int], list[int]]:
-    """Return the first node and the one behind the last, with one node outside around.
-
-    Nodes on the border of the grid count as outside.
-    """
-    low: list[int] = []
-    high: list[int] = []
-    last = len(inside) - 1
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        used = inside.any(others[1]).any(others[0]).nonzero()[:, 0]
-        low.append(max(int(used[0]) - 1, 0))
-        high.append(min(int(used[-1]) + 2, last + 1))
-    return low, high
+def _bounds(inside: Bool[np.ndarray, "n n n"]) -> tuple[slice, slice, slice] | None:
+    """Return from where to where nodes are inside; None if none is."""
+    used = [np.flatnonzero(np.any(inside, others)) for others in ((1, 2), (0, 2), (0, 1))]
+    if len(used[0]) == 0:
+        return None
+    x, y, z = (slice(int(line[0]), int(line[-1]) + 1) for line in used)
+    return x, y, z

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
-from torch.nn import functional as F
 
 from ._cubes import numbers_of
 from ._elements import Elements
@@ -15,7 +14,7 @@ NEGLIGIBLE = 2e-3
 """Elements whose Gaussian times constant is smaller at all points of a group are left out there."""
 _GROUP = 32
 """Neighbouring points that are worked on together."""
-_ROWS, _BLOCKS = 8, 32
+_ROWS, _BLOCKS = 8, 64
 """Groups of one element in a block, and blocks worked on together: as the cache of a core holds."""
 _POINTS = 65_536
 
@@ -25,20 +24,18 @@ class FastField:
     """Shapes in a form that is quick to evaluate.
 
     The exponents of all Gaussians at a point are one matrix product: they are polynomials of the
-    second degree. So is the first layer of the local decoder, together with whatever is linear in
-    it; each layer is merged with the normalisations around it.
+    second degree. They tell which elements matter, and are used again for those that do. The first
+    layer of the local decoder is linear, and so is what goes past the others; each layer is merged
+    with the normalisations around it.
     """
 
     polynomial: Float[Tensor, "shapes elements 10"]
     """Exponents plus the logarithm of the constant: above 0 where an element matters."""
-    enter: Float[Tensor, "shapes elements width_and_4 10"]
-    """From a point to the first layer, 1, the linear part of the result, the same with the other
-    sign, and half the squared distance from the Gaussian's centre."""
+    enter: Float[Tensor, "shapes elements width_and_2 4"]
+    """From a point to the first layer, 1, and the linear part of the result."""
     middle: Float[Tensor, "shapes elements width width_and_1"]
     leave: Float[Tensor, "shapes elements 1 width"]
     """Weights of the middle layer in the result."""
-    loud: Float[Tensor, "shapes elements"]
-    """Values at the centres."""
 
     def __call__(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
         """Return the field of one shape.
@@ -54,23 +51,26 @@ class FastField:
     def _together(self, shape: int, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
         """Return the field of one shape: elements that matter to a group are added to all of it."""
         terms = _terms(points, -len(points) % _GROUP + _GROUP)
-        most = (self.polynomial[shape] @ terms).unflatten(-1, (-1, _GROUP)).amax(-1)
-        terms = terms.unflatten(-1, (-1, _GROUP))
-        found = terms.new_zeros(terms.shape[1:])
-        element, group = _in_blocks(most[:, :-1] > 0)
+        exponents = (self.polynomial[shape] @ terms).unflatten(-1, (-1, _GROUP))
+        element, group = _in_blocks(exponents.amax(-1)[:, :-1] > 0)
+        place = terms[6:].unflatten(-1, (-1, _GROUP))
+        found = terms.new_zeros(place.shape[1:])
+        row = (element * len(found)).repeat_interleave(_ROWS) + group
+        exponents = exponents.flatten(0, 1)
         width = self.middle.shape[-2]
-        parts = (self.enter[shape], self.middle[shape], self.leave[shape], self.loud[shape])
-        for number, near in zip(element.split(_BLOCKS), group.split(_BLOCKS * _ROWS), strict=True):
-            enter, middle, leave, loud = (part.index_select(0, number) for part in parts)
-            place = terms.index_select(1, near).view(10, len(number), _ROWS * _GROUP)
-            # none of the rows may be below 0, so all are cut there in place
-            first = (enter @ place.transpose(0, 1)).clamp_min_(0)
-            second = (middle @ first[:, : width + 1]).clamp_min_(0)
-            value = (leave @ second)[:, 0]
-            value += first[:, width + 1]
-            value -= first[:, width + 2]
-            value *= first[:, width + 3].neg().exp_().mul_(loud[:, None])
-            found.index_add_(0, near, value.view(-1, _GROUP))
+        parts = (self.enter[shape], self.middle[shape], self.leave[shape])
+        size = _BLOCKS * _ROWS
+        for number, near, which in zip(
+            element.split(_BLOCKS), group.split(size), row.split(size), strict=True
+        ):
+            enter, middle, leave = (part.index_select(0, number) for part in parts)
+            here = place.index_select(1, near).view(4, len(number), _ROWS * _GROUP)
+            first = enter @ here.transpose(0, 1)
+            hidden = first[:, : width + 1].relu_()
+            second = (middle @ hidden).relu_()
+            value = torch.baddbmm(first[:, width + 1 :], leave, second).view(-1, _GROUP)
+            value *= exponents.index_select(0, which).exp_()
+            found.index_add_(0, near, value)
         return found.flatten()[: len(points)]
 
 
@@ -139,15 +139,12 @@ def fast_field(network: ShapeNetwork, elements: Elements) -> FastField:
     straight[..., -1] += decoder.leave.bias + 1
     one = torch.zeros_like(straight)
     one[..., -1] = 1
-    enter = F.pad(torch.cat((first, one, straight, -straight), -2), (6, 0))
-    away = -polynomial
-    away[..., -1] += limit / 2
     middle = decoder.inner.weight * g2[..., :, None]
     bias = b2 + g2 * decoder.inner.bias
+    # what an exponential is multiplied by, that of an exponent 0 being negligible
     return FastField(
         polynomial=polynomial,
-        enter=torch.cat((enter, away[..., None, :]), -2),
+        enter=torch.cat((first, one, -NEGLIGIBLE * straight), -2),
         middle=torch.cat((middle, bias[..., None]), -1),
-        leave=(weight @ decoder.outer.weight)[..., None, :],
-        loud=elements.constant.clamp(max=-1e-12),
+        leave=-NEGLIGIBLE * (weight @ decoder.outer.weight)[..., None, :],
     )

@@ -132,7 +132,11 @@ def _parted(points: Points, faces: Faces) -> tuple[Points, Faces]:
 
 def fitted(points: Points, like: Float[np.ndarray, "others 3"]) -> Points:
     """Return points moved and scaled along each axis to the bounds of others."""
-    low, high = like.min(axis=0), like.max(axis=0)
-    first, last = points.min(axis=0), points.max(axis=0)
-    share = (points - first) / np.maximum(last - first, 1e-12)
-    return (low + share * (high - low)).clip(low, high)
+    # axis by axis: rows of three are slow
+    found = np.zeros(points.shape)
+    for axis in range(3):
+        wanted, along = np.ascontiguousarray(like[:, axis]), np.ascontiguousarray(points[:, axis])
+        low, high, first, last = wanted.min(), wanted.max(), along.min(), along.max()
+        share = (along - first) / max(last - first, 1e-12)
+        found[:, axis] = (low + share * (high - low)).clip(low, high)
+    return found

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int64, UInt8
+from jaxtyping import Bool, Float, Int32, Int64, UInt8
 from torch import Tensor
 
 from ._cubes import (
@@ -32,18 +32,16 @@ _OWN = 1 << _BITS
 class _Tables:
     """Constants of blocks of 4 x 4 x 4 cells."""
 
-    cells: Int64[Tensor, "64 3"]
-    eighth: Int64[Tensor, " 64"]
+    cells: Int32[Tensor, "64 3"]
+    eighth: Int32[Tensor, " 64"]
     """Of the block, that each cell is in."""
-    slope: Float[Tensor, "125 192"]
-    """From values to differences along each axis, in each cell."""
-    around: Int64[Tensor, "3 4 3"]
+    around: Int32[Tensor, "3 4 3"]
     """From where an edge along each axis starts to the cells around it, counter-clockwise."""
-    number: Int64[Tensor, "3 4"]
+    number: Int32[Tensor, "3 4"]
     """Of that edge, in each of the four."""
-    loop: Int64[Tensor, "256 12"]
+    loop: Int32[Tensor, "256 12"]
     """Which of the surface's parts in a cell of each case goes through each edge."""
-    parts: Int64[Tensor, " 256"]
+    parts: Int32[Tensor, " 256"]
     """How many there are."""
     within: Bool[Tensor, "2 192"]
     """Whether all cells around an edge are in the same block, and in the same eighth."""
@@ -53,20 +51,20 @@ class _Tables:
 class _Parts:
     """Parts of the surface, one or more in each cell that it passes through."""
 
-    block: Int64[Tensor, " parts"]
-    eighth: Int64[Tensor, " parts"]
+    block: Int32[Tensor, " parts"]
+    eighth: Int32[Tensor, " parts"]
     flat: tuple[Bool[Tensor, " blocks"], Bool[Tensor, " eighths"]]
-    known: Int64[Tensor, " cells"]
+    known: Int32[Tensor, " cells"]
     """Number of each cell's first part, times 256, plus the case."""
 
-    def vertices(self) -> Int64[Tensor, " parts"]:
+    def vertices(self) -> Int32[Tensor, " parts"]:
         """Return the vertex of each part."""
         count, blocks = len(self.block), len(self.flat[0])
-        found = torch.arange(count)
+        found = torch.arange(count, dtype=torch.int32)
         found = torch.where(at(self.flat[1], self.eighth), count + blocks + self.eighth, found)
         found = torch.where(at(self.flat[0], self.block), count + self.block, found)
-        used = torch.zeros(count + 9 * blocks, dtype=torch.int64).index_fill_(0, found, 1)
-        return at(used.cumsum(0) - 1, found)
+        used = torch.zeros(count + 9 * blocks, dtype=torch.int32).index_fill_(0, found.long(), 1)
+        return at(used.cumsum(0, dtype=torch.int32) - 1, found)
 
 
 def gathered_surface(
@@ -95,13 +93,14 @@ def gathered_surface(
     values, cases, place = values.cpu(), cases.cpu(), place.cpu()
     points, block, edge, rises = crossings(values, place)
     steps = torch.tensor([(CELLS * count) ** 2, CELLS * count, 1])
-    base, local = (CELLS * place * steps).sum(1), (tables.cells * steps).sum(1)
+    # numbers of 32 bits: half of the memory
+    base, local = ((first * steps).sum(1).int() for first in (CELLS * place, tables.cells))
     parts = _parts(values, cases, base, local, (CELLS * count) ** 3)
     axis, cell = edge >> _BITS, edge & (_OWN - 1)
     start = at(base, block) + at(local, cell)
     eighth = 8 * block + at(tables.eighth, cell)
     inner = [at(within, edge) for within in tables.within]
-    around = (tables.around * steps).sum(2)
+    around = (tables.around * steps).sum(2).int()
     blocks, eighths = parts.flat
     none = torch.zeros_like(blocks), torch.zeros_like(eighths)
     for flat in ((blocks, eighths), (none[0], eighths), none):
@@ -126,8 +125,8 @@ def gathered_surface(
 def _parts(
     values: Float[Tensor, "blocks 125"],
     cases: UInt8[Tensor, "blocks 64"],
-    base: Int64[Tensor, " blocks"],
-    local: Int64[Tensor, " 64"],
+    base: Int32[Tensor, " blocks"],
+    local: Int32[Tensor, " 64"],
     cells: int,
 ) -> _Parts:
     """Return the parts of the surface.
@@ -140,30 +139,43 @@ def _parts(
         cells: Of the grid.
     """
     tables = _tables()
-    number = numbers_of(mixed(cases))
+    number = numbers_of(mixed(cases)).int()
     block, cell = number >> _BITS, number & (_OWN - 1)
     eighth = 8 * block + at(tables.eighth, cell)
-    case = at(cases, number).long()
+    case = at(cases, number).int()
     count = at(tables.parts, case)
-    x, y, z = (values @ tables.slope).view(-1, 3).index_select(0, number).t().contiguous()
+    place = cell * len(values) + block
+    x, y, z = (at(slope, place) for slope in _slopes(values))
     length = (x * x + y * y + z * z).sqrt_().clamp_min_(1e-9)
+    normal = [along / length for along in (x, y, z)]
     # where a cell has several parts nothing is flat
     least = torch.where(count == 1, 1.0, torch.inf)
     flat = []
     for cube, share, cubes in ((block, _FLAT[0], len(base)), (eighth, _FLAT[1], 8 * len(base))):
-        total = [torch.bincount(cube, along / length, cubes).square_() for along in (x, y, z)]
+        total = [torch.bincount(cube, along, cubes).square_() for along in normal]
         flat.append(sum(total) > (share * torch.bincount(cube, least, cubes)).square_())
-    known = torch.zeros(cells, dtype=torch.int64)
-    known[at(base, block) + at(local, cell)] = ((count.cumsum(0) - count) << 8) + case
-    block, eighth = block.repeat_interleave(count), eighth.repeat_interleave(count)
-    return _Parts(block, eighth, (flat[0], flat[1]), known)
+    known = torch.zeros(cells, dtype=torch.int32)
+    place = at(base, block) + at(local, cell)
+    known[place.long()] = ((count.cumsum(0, dtype=torch.int32) - count) << 8) + case
+    eighth = eighth.repeat_interleave(count)
+    return _Parts(eighth >> 3, eighth, (flat[0], flat[1]), known)
+
+
+def _slopes(values: Float[Tensor, "blocks 125"]) -> tuple[Float[Tensor, "4 4 4 blocks"], ...]:
+    """Return four times the slopes along each axis in the middle of each cell."""
+    # block beside block: many at once
+    x = values.t().contiguous().view(*(CELLS + 1,) * 3, len(values))
+    along, across = x[:, :, 1:] + x[:, :, :-1], x[:, :, 1:] - x[:, :, :-1]
+    both, y = along[:, 1:] + along[:, :-1], along[:, 1:] - along[:, :-1]
+    z = across[:, 1:] + across[:, :-1]
+    return both[1:] - both[:-1], y[1:] + y[:-1], z[1:] + z[:-1]
 
 
 def _triangles(
-    corner: Int64[Tensor, "quads 4"], rises: Bool[Tensor, " quads"]
+    corner: Int32[Tensor, "quads 4"], rises: Bool[Tensor, " quads"]
 ) -> Int64[np.ndarray, "faces 3"]:
     """Return two triangles of each quad, as far as they have an area."""
-    one, two, three, four = corner.unbind(1)
+    one, two, three, four = corner.t().contiguous()
     two, four = torch.where(rises, two, four), torch.where(rises, four, two)
     found = []
     for triangle in ((one, two, three), (one, three, four)):
@@ -174,7 +186,7 @@ def _triangles(
 
 
 def _means(
-    corner: Int64[Tensor, "quads 4"], points: Float[Tensor, "quads 3"]
+    corner: Int32[Tensor, "quads 4"], points: Float[Tensor, "quads 3"]
 ) -> Float[np.ndarray, "vertices 3"]:
     """Return the middle of the points of each vertex."""
     member = corner.flatten()
@@ -201,25 +213,20 @@ def _tables() -> _Tables:
         ]
         for lows, highs in zip((-around).tolist(), (axes[:, None] - around).tolist(), strict=True)
     ]
-    loop = torch.zeros(1 << 8, len(EDGES), dtype=torch.int64)
+    loop = torch.zeros(1 << 8, len(EDGES), dtype=torch.int32)
     rings = [case_loops(case) for case in range(len(loop))]
     for case, found in enumerate(rings):
         for place, ring in enumerate(found):
             loop[case, ring] = place
     cells = torch.cartesian_prod(*(torch.arange(CELLS),) * 3)
-    nodes = torch.tensor([(CELLS + 1) ** 2, CELLS + 1, 1])
-    slope = torch.zeros((CELLS + 1) ** 3, _OWN, 3)
-    for place in torch.tensor(CORNERS):
-        slope[((cells + place) * nodes).sum(1), torch.arange(_OWN)] += (2 * place - 1).float()
     across = axes.repeat_interleave(_OWN, 0) > 0
     first = cells.repeat(3, 1)
     return _Tables(
-        cells=cells,
-        eighth=(cells // 2 * torch.tensor([4, 2, 1])).sum(1),
-        slope=slope.flatten(1),
-        around=around,
-        number=torch.tensor(number),
+        cells=cells.int(),
+        eighth=(cells // 2 * torch.tensor([4, 2, 1])).sum(1).int(),
+        around=around.int(),
+        number=torch.tensor(number).int(),
         loop=loop,
-        parts=torch.tensor([len(found) for found in rings]),
+        parts=torch.tensor([len(found) for found in rings]).int(),
         within=torch.stack([(across | (first % size > 0)).all(1) for size in (CELLS, 2)]),
     )

@@ -1,13 +1,15 @@
 """The stage: a photo and its objects to shapes."""
 
+import math
 from pathlib import Path
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from panoscene._editions import Edition
 from panoscene.geometry import perspective_crop, view_relative_yaw
+from panoscene.models._folding import fold_norms
 from panoscene.models._weights import load_network, weights_file
 from panoscene.scene import Mesh, Objects, Shapes, ShapeSource, box_mesh, built_in
 
@@ -15,6 +17,7 @@ from ._config import CONFIGS
 from ._extract import extract_meshes
 from ._fewer import FACES_PER_CELL
 from ._network import ShapeNetwork, build_shape, view_hints
+from ._threads import alone, side_by_side
 
 STAGE = "shape"
 """Name of this stage in files with weights."""
@@ -23,6 +26,8 @@ THIN_METRES = 0.03
 THIN_SHARE = 0.06
 """So are those whose smallest side is less than this share of the longest: carpets, pictures."""
 _BATCH = 32
+_TOGETHER = 10
+"""Pictures that a thread works on at once."""
 
 
 class ShapeStage:
@@ -88,11 +93,23 @@ class ShapeStage:
         lon = torch.atan2(boxes.centre[:, 0], boxes.centre[:, 1])
         hints = view_hints(bfov, boxes.size.to(image), view_relative_yaw(boxes.yaw, lon).to(image))
         category = objects.category.to(self.device)
+        quick = self.device.type == "cpu"
+
+        @torch.inference_mode()
+        def some(number: Int64[Tensor, " m"]) -> Float[Tensor, "m code"]:
+            crops = perspective_crop(image, bfov[number], (rows, rows)).clamp(0, 1)
+            if quick:
+                crops = crops.contiguous(memory_format=torch.channels_last)
+            return self.network(crops, category[number], hints[number])
+
         found = [torch.zeros(0, self.network.config.code, device=self.device)]
-        for start in range(0, len(bfov), _BATCH):
-            piece = slice(start, start + _BATCH)
-            crops = perspective_crop(image, bfov[piece], (rows, rows)).clamp(0, 1)
-            found.append(self.network(crops, category[piece], hints[piece]))
+        number = torch.arange(len(bfov), device=self.device)
+        if not quick:
+            return torch.cat(found + [some(part) for part in number.split(_BATCH) if len(part)])
+        # pieces do not depend on how many threads there are: nor does what is found
+        pieces = number.tensor_split(2 * max(math.ceil(len(number) / (2 * _TOGETHER)), 1))
+        with alone() as threads:
+            found += side_by_side(some, (part for part in pieces if len(part)), threads)
         return torch.cat(found)
 
 
@@ -131,4 +148,5 @@ def load_shape_stage(
     """
     path = weights_file(STAGE, edition, weights)
     network = load_network(path, build_shape, CONFIGS[edition], stage=STAGE, edition=edition)
+    fold_norms(network.encoder.backbone)
     return ShapeStage(network, device)
