@@ -333,6 +333,10 @@ def test_the_page_says_where_relations_are_better_than_the_rule_and_where_not() 
     page = results_page([rendered("full", **{wall: 0.866, floor: 0.95}), rule])
     assert "`full` is ahead in floor, not in wall (86.6 to 87.6)." in page
     assert "against the rule" not in results_page([scores("full"), scores("pose")])
+    difference = {"relations.touching_wall_f1": Measured(value=-0.01, low=-0.02, high=0.004)}
+    full = rendered("full", **{wall: 0.866, floor: 0.95})
+    full = full.model_copy(update={"differences": {"pose": difference}})
+    assert "not in wall (86.6 to 87.6, difference -1.0 [-2.0, 0.4])." in results_page([full, rule])
 
 
 def test_parts_of_the_set_have_rows_of_their_own() -> None:

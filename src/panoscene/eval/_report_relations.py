@@ -82,19 +82,24 @@ def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str
                 continue
             if ours.value is None or theirs.value is None or ours.value == theirs.value:
                 continue
-            (ahead if ours.value > theirs.value else behind).append((column, ours, theirs))
-        words = f"`{name}` is ahead in {listed([_relation(column) for column, _, _ in ahead])}"
+            both = rows[name].differences.get(_RULE, {}).get(column.metric)
+            (ahead if ours.value > theirs.value else behind).append((column, ours, theirs, both))
+        words = f"`{name}` is ahead in {listed([_relation(column) for column, *_ in ahead])}"
         if behind:
-            cells = [
-                f"{_relation(column)} ({measured_cell(Measured(value=ours.value), column.factor)}"
-                f" to {measured_cell(Measured(value=theirs.value), column.factor)})"
-                for column, ours, theirs in behind
-            ]
-            words += f", not in {listed(cells)}"
+            words += f", not in {listed([_lost(*found) for found in behind])}"
         verdicts.append(words)
     if not verdicts:
         return ""
     return f"F1 against the rule of geometry on the boxes of `{_RULE}`: {'; '.join(verdicts)}."
+
+
+def _lost(column: Column, ours: Measured, theirs: Measured, both: Measured | None) -> str:
+    """Return a relation with both numbers, and the interval of their difference if it is known."""
+    first, second = (
+        measured_cell(Measured(value=one.value), column.factor) for one in (ours, theirs)
+    )
+    difference = "" if both is None else f", difference {measured_cell(both, column.factor)}"
+    return f"{_relation(column)} ({first} to {second}{difference})"
 
 
 def _relation(column: Column) -> str:
