@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from panoscene.scene import write_atomically
+from panoscene.synth.dataset import open_dataset
 from panoscene.train import SELECTION, Stage, TrainError, TrainRecipe, read_train_recipe
 from panoscene.train._panoramas import training_panoramas
 
@@ -72,6 +73,7 @@ def curve(run: Path, data: Path | None) -> dict[str, Any]:
         "stage": recipe.stage,
         "edition": recipe.edition,
         "panoramas": panoramas_of(recipe, data or recipe.data),
+        "homes_version": homes_version_of(data or recipe.data),
         "steps": recipe.steps,
         "batch_size": recipe.batch_size,
         "started": recipe.start is not None,
@@ -87,6 +89,13 @@ def panoramas_of(recipe: TrainRecipe, data: Path | None) -> int:
     if data is None:
         raise TrainError("recipe", "data: found none, expected --data with the data set")
     return len(training_panoramas(data, recipe))
+
+
+def homes_version_of(data: Path | None) -> int:
+    """Return the version of the homes that a training learned from."""
+    if data is None:
+        raise TrainError("recipe", "data: found none, expected --data with the data set")
+    return open_dataset(data).info.homes_version
 
 
 if __name__ == "__main__":

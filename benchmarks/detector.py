@@ -81,6 +81,7 @@ def measure(options: argparse.Namespace, weights: Path, items: Sequence[Panorama
         "panoramas": len(items),
         "roll": options.roll,
         "set": open_dataset(options.data).info.name,
+        "homes_version": open_dataset(options.data).info.homes_version,
         "weights": file_hash(weights),
         "machine": machine_facts(),
     }

@@ -75,6 +75,7 @@ def main() -> None:
     result = {
         "machine": machine_facts(),
         "part": " and ".join(choice.split),
+        "homes_version": open_dataset(choice.data).info.homes_version,
         "panoramas": len(items),
         "seconds_one_thread": seconds[len(seconds) // 2],
         "megabytes": weights.stat().st_size / 1e6,

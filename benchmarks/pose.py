@@ -1,13 +1,14 @@
 """Scores the pose network with true BFoVs: writes benchmarks/pose.json and its model card.
 
     python benchmarks/pose.py DATA [--weights FILE] [--records FOLDER]
-    python benchmarks/pose.py DATA --split test-seen test-unseen --output benchmarks/pose-test.json
+    python benchmarks/pose.py DATA --split test-seen test-unseen --records FOLDER \
+        --output benchmarks/pose-test.json
 
 Without a file the weights that come with the package are scored. Each panorama goes through the
 stage as a photo does: turned upright, cropped, with and without the true layout. ``--records`` is
-the output of ``panoscene precompute`` by the weights of the package; with it, detections and
-layouts of the networks are scored too. With another part or another file to write, the model card
-stays as it is.
+the output of ``panoscene precompute`` for these parts by the weights of the package; with it,
+detections and layouts of the networks are scored too. With another part or another file to write,
+the model card stays as it is.
 """
 
 import argparse
@@ -111,6 +112,7 @@ def measure(data: Path, splits: Sequence[str], weights: Path, records: Path | No
     count = np.bincount(torch.cat([s.objects.category for s in truth]).numpy(), minlength=57)
     return {
         "split": " and ".join(splits),
+        "homes_version": open_dataset(data).info.homes_version,
         "panoramas": len(truth),
         "objects": int(count.sum()),
         "rows": rows,

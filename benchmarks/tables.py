@@ -9,8 +9,10 @@
     panoscene bench pipeline --json > benchmarks/pipeline.json
     python benchmarks/layout.py DATA
     python benchmarks/layout.py DATA --split train --output benchmarks/layout-train.json
-    python benchmarks/pose.py DATA --records FOLDER
+    python benchmarks/pose.py DATA
     python benchmarks/pose.py DATA --split train --output benchmarks/pose-train.json
+    python benchmarks/pose.py DATA --split test-seen test-unseen --records FOLDER \
+        --output benchmarks/pose-test.json
     python benchmarks/upright.py FOLDER-OF-A-RENDERED-SET
     python benchmarks/curves.py NAME=RUN_FOLDER ...
     python benchmarks/shape_scores.py RECIPE WEIGHTS
@@ -151,8 +153,7 @@ def detector_text() -> dict[str, str]:
         measured = json.loads(file.read_text())
         scores = measured["scores"]["circular"]
         cells = [f"{100 * scores[name]:.1f}" for name in names]
-        part = measured["split"]
-        lines.append(f"| {part} | {measured['panoramas']} | {' | '.join(cells)} |")
+        lines.append(f"| {_part(measured)} | {measured['panoramas']} | {' | '.join(cells)} |")
     return {"detector-parts": "\n".join(lines)}
 
 
@@ -166,12 +167,15 @@ def layout_text() -> dict[str, str]:
     ]
     for found in (train, val):
         row = found["rows"]["network"]
-        lines.append(_layout_row(found["part"], found["panoramas"], [
+        lines.append(_layout_row(_part(found), found["panoramas"], [
             row[f"{drawn}iou_{k}d"] for drawn in ("", "raw_") for k in (2, 3)
         ]))  # fmt: skip
     names = [f"layout.{how}.overall.iou_{k}d" for how in ("regularised", "raw") for k in (2, 3)]
     values = [test["metrics"][name]["value"] for name in names]
-    lines.append(_layout_row("test-seen and test-unseen", test["scenes"], values))
+    homes = _measured("layout-test")
+    if homes["panoramas"] != test["scenes"]:
+        raise SystemExit("layout-test.json and results/pose.json: are of different panoramas")
+    lines.append(_layout_row(_part(homes), test["scenes"], values))
     texts = {"layout-parts": "\n".join(lines)}
     true = val["rows"]["true boundaries"]
     texts["layout-truth"] = (
@@ -185,7 +189,6 @@ def layout_text() -> dict[str, str]:
             f"On {val['part']} it is worse in {round(row['worse'] * rooms)} of {rooms} rooms, by "
             f"at most {row['most_worse']:.3f}."
         )
-    homes = _measured("layout-test")
     row, rooms = homes["rows"]["network"], homes["panoramas"]
     texts["layout-ambiguous"] = (
         f"It is set for {round(row['ambiguous'] * rooms)} of the {rooms} rooms of the test homes, "
@@ -193,6 +196,12 @@ def layout_text() -> dict[str, str]:
         "without it."
     )
     return texts
+
+
+def _part(measured: dict[str, Any]) -> str:
+    """Return which part of which homes was measured."""
+    part = measured.get("split") or measured["part"]
+    return f"{part}, homes of version {measured.get('homes_version', 1)}"
 
 
 def _layout_row(part: str, rooms: int, values: list[float]) -> str:
@@ -209,10 +218,10 @@ def pose_text() -> dict[str, str]:
             row = found["rows"][name]
             turned = f"{row['front_back']:.1%}".replace("%", " %")
             lines.append(
-                f"| {found['split']} | {found['objects']} | {words} | {row['ap_15']:.3f} |"
+                f"| {_part(found)} | {found['objects']} | {words} | {row['ap_15']:.3f} |"
                 f" {_ranked(row)} | {turned} |"
             )
-    rows = parts[1]["rows"]
+    rows = parts[2]["rows"]
     columns = ("AP@0.15", "AP@0.25", "AP@0.5", "centre", "distance", "size", "yaw")
     found = [f"| input | {' | '.join((*columns, 'front for back'))} |", "| --- " * 9 + "|"]
     found += [
@@ -247,7 +256,9 @@ def curves_text() -> dict[str, str]:
     if not file.is_file():
         return {}
     runs = json.loads(file.read_text())
-    texts = {"curves": curves_table(runs)}
+    of_sizes = {name: run for name, run in runs.items() if _is_of_sizes(name, run)}
+    others = {name: run for name, run in runs.items() if name not in of_sizes}
+    texts = {"curves": curves_table(others), "curves-panoramas": panoramas_table(of_sizes)}
     if "detector" in runs:
         texts["curve-detector"] = detector_curve(runs["detector"])
     return texts
@@ -266,6 +277,30 @@ def curves_table(runs: dict[str, Any]) -> str:
             f" {run['selection']} |"
         )
     return "\n".join(lines)
+
+
+def panoramas_table(runs: dict[str, Any]) -> str:
+    """Return what the same training reaches with so many panoramas, a row for each stage."""
+    stages: dict[str, dict[int, dict[str, Any]]] = {}
+    for run in runs.values():
+        stages.setdefault(run["stage"], {})[run["panoramas"]] = run
+    counts = sorted({count for row in stages.values() for count in row})
+    head = ["network", "homes of version", "steps", *(f"{n} panoramas" for n in counts), "score"]
+    lines = [f"| {' | '.join(head)} |", "| --- " * len(head) + "|"]
+    for stage, row in stages.items():
+        run = next(iter(row.values()))
+        best = [
+            f"{max(point['selection'] for point in row[n]['points']):.3f}" if n in row else "-"
+            for n in counts
+        ]
+        cells = [stage, str(run.get("homes_version", 1)), str(run["steps"]), *best]
+        lines.append(f"| {' | '.join(cells)} | {run['selection']} |")
+    return "\n".join(lines)
+
+
+def _is_of_sizes(name: str, run: dict[str, Any]) -> bool:
+    """Return whether a training is one of several with different numbers of panoramas."""
+    return name == f"{run['stage']}-{run['panoramas']}"
 
 
 def _point(point: dict[str, Any], best: bool) -> str:
