@@ -142,18 +142,18 @@ def run_score(
     jobs, known = _jobs(source, targets)
     results: list[ScoreFile] = []
     count = sum(len(list(job[2].glob("*.json"))) for job in jobs)
-    folders = {folder.name: (folder, truth) for folder, _, truth in jobs}
+    folders = {folder.name: (folder, facts, truth) for folder, facts, truth in jobs}
     wanted = {name for _, facts, _ in jobs for name in facts.compared_with}
     measured: dict[str, FolderRecords] = {}
     with progress_bar("scoring", count) as advance:
 
         def records_of(name: str) -> FolderRecords:
             if name not in measured:
-                folder, truth = folders[name]
+                folder, facts, truth = folders[name]
                 measured[name] = measure_folder(
                     folder,
                     truth,
-                    shapes=shapes,
+                    shapes=shapes and facts.shapes,
                     workers=workers or os.cpu_count() or 1,
                     progress=advance,
                     warn=_warn,

@@ -36,6 +36,8 @@ class ExportedMethod:
     """Horizontal degrees that the method sees at a time."""
     compared_with: tuple[str, ...] = ()
     """Methods that it should be better than: differences to them are measured scene by scene."""
+    shapes: bool = True
+    """Whether its meshes, or the boxes that stand in for them, say anything that others do not."""
 
 
 class Manifest(BaseModel):

@@ -24,16 +24,21 @@ ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
             "ours",
             "the pose network's boxes, arranged with relations that follow from them",
             compared_with=("pose",),
+            shapes=False,
         ),
         "pose": ExportedMethod(
             "input", "the pose network's boxes alone, relations by a geometric rule"
         ),
         "mean-box": ExportedMethod(
-            "baseline", "mean size where its height fills the BFoV, in a square room"
+            "baseline",
+            "mean size where its height fills the BFoV, in a square room",
+            shapes=False,
         ),
         "true-layout": ExportedMethod("oracle", "the whole pipeline in the true room"),
         "true-detections": ExportedMethod("oracle", "the whole pipeline on the true BFoVs"),
-        "true-boxes": ExportedMethod("oracle", "the true boxes in the room that the pipeline sees"),
+        "true-boxes": ExportedMethod(
+            "oracle", "the true boxes in the room that the pipeline sees", shapes=False
+        ),
         "true-relations": ExportedMethod(
             "oracle", "the arrangement in the true room, with true BFoVs and relations"
         ),

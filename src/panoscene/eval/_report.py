@@ -303,23 +303,23 @@ def _plausibility_part(scores: Sequence[ScoreFile]) -> list[str]:
 def _meshes_part(scores: Sequence[ScoreFile]) -> list[str]:
     parts: list[str] = []
     missing: list[str] = []
-    if any("shape.targets" in score.metrics for score in scores):
+    if _with(scores, "shape.targets"):
         parts += [
             "## Shapes",
             "Meshes against the true ones, each scaled to its box. Chamfer: 1000 times the mean "
             "squared distances, of found objects; all else in percent, a missed object counting "
             "as 0 unless the heading says `found`. `as boxes`: predicted without a mesh, so that "
             "the box stands in; rows of boxes alone say what the shape network is good for.",
-            score_table(scores, SHAPE),
+            score_table(_with(scores, "shape.targets"), SHAPE),
         ]
     else:
         missing.append("shapes")
-    if any("penetration.penetrating_pairs" in score.metrics for score in scores):
+    if _with(scores, "penetration.penetrating_pairs"):
         parts += [
             "## Mesh penetration",
             "How far the meshes of objects are in each other; a chair under a table is not. Hulls "
             "stand in for meshes that are not closed, boxes where there is none.",
-            score_table(scores, PENETRATION),
+            score_table(_with(scores, "penetration.penetrating_pairs"), PENETRATION),
         ]
     else:
         missing.append("mesh penetration")
@@ -331,3 +331,7 @@ def _meshes_part(scores: Sequence[ScoreFile]) -> list[str]:
             "eval score --shapes` measures them, and `eval report` then shows them here.",
         ]
     return parts
+
+
+def _with(scores: Sequence[ScoreFile], metric: str) -> list[ScoreFile]:
+    return [score for score in scores if metric in score.metrics]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Float, Int64
 from scipy.spatial import KDTree
@@ -78,16 +79,19 @@ def surface_distance(points: Float[Tensor, "n 3"], surface: SurfaceSamples) -> S
     triangles belong to, and so is 0 for points of the same surface. It can only be too large, and
     then by less than the size of a triangle.
     """
-    apart, _ = KDTree(surface.point.numpy()).query(points.numpy())
     every = torch.arange(len(surface.triangle))
     landmark = torch.cat((surface.point, surface.triangle.mean(1)))
     owner = torch.cat((surface.face, every))
-    count = min(NEIGHBOURS, len(landmark))
-    _, index = KDTree(landmark.numpy()).query(points.numpy(), k=count)
-    face = owner[torch.from_numpy(index).reshape(-1, count)]
+    away, index = _nearest(landmark, points, min(NEIGHBOURS, len(landmark)))
+    # the nearest of all samples, unless those found are middles of triangles alone
+    apart = torch.where(index < len(surface.point), away, torch.inf).amin(1)
+    alone = (apart == torch.inf).nonzero()[:, 0]
+    if len(alone):
+        apart[alone] = _nearest(surface.point, points[alone], 1)[0][:, 0]
+    face = owner[index]
     distance, best = triangle_distance(points[:, None], surface.triangle[face]).min(dim=1)
     nearest = face.gather(1, best[:, None])[:, 0]
-    return SurfaceDistance(torch.from_numpy(apart), distance, nearest)
+    return SurfaceDistance(apart, distance, nearest)
 
 
 def triangle_distance(
@@ -123,6 +127,32 @@ def triangle_distance(
     inside = (v >= 0) & (w >= 0) & (v + w <= 1) & ~flat
     nearest = torch.where(inside, torch.minimum(nearest, squared(v, w)), nearest)
     return nearest.clamp(min=0).sqrt()
+
+
+def _nearest(
+    places: Float[Tensor, "m 3"], points: Float[Tensor, "n 3"], count: int
+) -> tuple[Float[Tensor, "n k"], Int64[Tensor, "n k"]]:
+    """Return distances and indices of the places nearest to points, the nearest first."""
+    # points on flat faces split badly in the middle: such trees take three times as long
+    tree = KDTree(places.numpy(), compact_nodes=False, balanced_tree=False)
+    order = _along_a_curve(points.numpy())  # neighbours ask for the same part of the tree
+    distance, index = tree.query(points.numpy()[order], k=range(1, count + 1))
+    back = torch.from_numpy(order).argsort()
+    return torch.from_numpy(distance)[back], torch.from_numpy(index)[back]
+
+
+def _along_a_curve(points: Float[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
+    """Return an order in which neighbours follow each other: the bits of three axes in turn."""
+    low = points.min(axis=0, initial=np.inf)
+    side = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300) if len(points) else 1.0
+    cell = ((points - low) / side * 1023).astype(np.int64)
+    key = np.zeros(len(points), np.int64)
+    for axis in range(3):
+        bits = cell[:, axis]
+        for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+            bits = (bits | (bits << shift)) & mask
+        key |= bits << axis
+    return np.argsort(key, kind="stable")
 
 
 def _dot(first: list[Tensor], other: list[Tensor]) -> Tensor:
