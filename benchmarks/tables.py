@@ -227,7 +227,7 @@ def pose_text() -> dict[str, str]:
     found += [
         f"| {words} | {_ranked(rows[name])} | {' | '.join(_pose_errors(rows[name]))} |"
         for name, words in POSE_FOUND.items()
-        if name in rows
+        if "yaw_error_deg" in rows.get(name, {})
     ]
     return {"pose-parts": "\n".join(lines), "pose-found": "\n".join(found)}
 

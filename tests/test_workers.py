@@ -1,12 +1,14 @@
 """Tasks in several processes, some of which do not survive them."""
 
 import importlib
+import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-from panoscene._workers import DIED, in_processes
+from panoscene._workers import in_processes, outcome
 
 DIES, IMPOSSIBLE = 1, 3
 WORK = """
@@ -19,12 +21,17 @@ def work(task):
         os.kill(os.getpid(), signal.SIGKILL)
     if number == 3:
         raise ValueError("three is impossible")
+    if number >= 10:
+        time.sleep(0.3)
     while number == 2 and not (folder / "1-began").exists():
         time.sleep(0.01)  # under way when the other process dies
     (folder / f"{number}-done").touch()
 
 def stumble(task):
     raise KeyError("a mistake")
+
+def die(task):
+    os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
@@ -41,7 +48,9 @@ def test_a_process_that_dies_costs_its_own_task_only(module: ModuleType, tmp_pat
     found = dict(in_processes(module.work, tasks, 2))
     assert len(found) == len(tasks)
     problems = {number: problem for (_, number), problem in found.items() if problem}
-    assert problems == {DIES: DIED, IMPOSSIBLE: "three is impossible"}
+    assert problems.pop(IMPOSSIBLE) == "three is impossible"
+    assert "its process died" in problems.pop(DIES)
+    assert problems == {}
     assert {path.name for path in tmp_path.glob("*-done")} == {
         "0-done",
         "2-done",
@@ -53,3 +62,25 @@ def test_a_process_that_dies_costs_its_own_task_only(module: ModuleType, tmp_pat
 def test_mistakes_end_the_run(module: ModuleType) -> None:
     with pytest.raises(KeyError, match="a mistake"):
         list(in_processes(module.stumble, range(4), 2))
+
+
+def test_processes_that_never_do_anything_end_the_run(module: ModuleType) -> None:
+    with pytest.raises(BrokenProcessPool):
+        list(in_processes(module.die, range(4), 2))
+
+
+def test_nothing_is_written_after_the_end(module: ModuleType, tmp_path: Path) -> None:
+    made = in_processes(module.work, [(tmp_path, number) for number in range(10, 20)], 2)
+    next(made)
+    made.close()
+    before = {path.name for path in tmp_path.glob("*-*")}
+    time.sleep(0.7)
+    assert {path.name for path in tmp_path.glob("*-*")} == before
+    assert len(before) < 20
+
+
+def test_every_problem_has_a_name() -> None:
+    def fail() -> None:
+        raise ValueError
+
+    assert outcome(fail) == "ValueError"

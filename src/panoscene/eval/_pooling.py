@@ -33,6 +33,8 @@ RECALL_LEVELS = (0.2, 0.4, 0.6)
 """Recalls at which methods are compared as equals."""
 _ERRORS = ("iou", "centre_error", "yaw_error", "size_error")
 """Of matched boxes."""
+_OF_FOUND = ("detection.matched_", "shape.canonical.", "shape.world.")
+"""What the names of metrics of found objects begin with."""
 
 Values = dict[str, float | None]
 Table = Float[np.ndarray, "scenes columns"]
@@ -82,8 +84,9 @@ def pooled_differences(
     """Return by how much the metrics of one method are above those of another, by their names.
 
     Both are measured on the same resamples, scene by scene, so what makes a scene hard for both
-    cancels out: such an interval is narrower than those of the two metrics suggest. Metrics at a
-    common recall and those that only one of the methods has are left out.
+    cancels out: such an interval is narrower than those of the two metrics suggest. Left out are
+    metrics at a common recall, those of objects that a method has found (each finds others), and
+    those that only one of the methods has.
 
     Args:
         records: one for each scene.
@@ -100,7 +103,7 @@ def pooled_differences(
     ours, theirs = (_drawn(some, {}, weights) for some in (records, others))
     differences: dict[str, Measured] = {}
     for name in ours:
-        if name in theirs:
+        if name in theirs and not name.startswith(_OF_FOUND):
             (value, column), (other, beside) = ours[name], theirs[name]
             both = None if value is None or other is None else value - other
             differences[name] = _measured(both, column - beside)

@@ -19,7 +19,7 @@ from panoscene.scene import (
 )
 from panoscene.synth.dataset import PanoramaItem
 
-SHAPED = ("full", "without-arrangement", "true-layout", "true-detections", "true-relations")
+SHAPED = ("full", "without-arrangement", "true-detections")
 """Rows whose objects have meshes, if the pipeline makes some; the others are boxes."""
 
 
@@ -90,6 +90,7 @@ def predicted_rows(item: PanoramaItem, truth: Scene, pipeline: Pipeline) -> dict
     """
     image = item.image()
     stages = replace(pipeline.stages, shape=None)
+    unshaped = Pipeline(stages, settings=pipeline.settings)
     alone = Pipeline(replace(stages, context=None), settings=None)
     repaired = Pipeline(replace(stages, context=None), settings=pipeline.settings)
     photo = Panorama(image.shape[-1], image.shape[-2], camera_height=truth.panorama.camera_height)
@@ -116,14 +117,14 @@ def predicted_rows(item: PanoramaItem, truth: Scene, pipeline: Pipeline) -> dict
         "pose-arranged": repaired(image, photo, given=found, name=item.name).scene,
         "pose": pose,
         "mean-box": mean_box_scene(pose),
-        "true-layout": pipeline(
+        "true-layout": unshaped(
             image, photo, given=replace(in_true_frame, layout=truth.layout), name=item.name
         ).scene,
         "true-detections": pipeline(
             image, photo, given=replace(in_true_frame, detections=true_seen), name=item.name
         ).scene,
         "true-boxes": alone(image, photo, given=told_boxes, name=item.name).scene,
-        "true-relations": pipeline(image, photo, given=told_all, name=item.name).scene,
+        "true-relations": unshaped(image, photo, given=told_all, name=item.name).scene,
     }
 
 

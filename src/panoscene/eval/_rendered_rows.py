@@ -34,13 +34,17 @@ ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
             "mean size where its height fills the BFoV, in a square room",
             shapes=False,
         ),
-        "true-layout": ExportedMethod("oracle", "the whole pipeline in the true room"),
+        "true-layout": ExportedMethod(
+            "oracle", "the whole pipeline in the true room", shapes=False
+        ),
         "true-detections": ExportedMethod("oracle", "the whole pipeline on the true BFoVs"),
         "true-boxes": ExportedMethod(
             "oracle", "the true boxes in the room that the pipeline sees", shapes=False
         ),
         "true-relations": ExportedMethod(
-            "oracle", "the arrangement in the true room, with true BFoVs and relations"
+            "oracle",
+            "the arrangement in the true room, with true BFoVs and relations",
+            shapes=False,
         ),
     }
 )

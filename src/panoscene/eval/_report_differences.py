@@ -15,6 +15,8 @@ from panoscene.eval._score_tables import (
     measured_cell,
 )
 
+_FEWEST_SCENES, _FEWEST_REPLICATES = 10, 100
+"""With fewer nothing is decided."""
 _COLUMNS: tuple[Column, ...] = (
     *DETECTION,
     RECALL[0],
@@ -32,7 +34,11 @@ def differences_part(scores: Sequence[ScoreFile]) -> list[str]:
         if any(column.metric in other for score in scores for other in score.differences.values())
     ]
     rows = [
-        [f"`{score.method}`", f"`{name}`", *(_cell(metrics.get(c.metric), c) for c in columns)]
+        [
+            f"`{score.method}`",
+            f"`{name}`",
+            *(_cell(score, metrics.get(c.metric), c) for c in columns),
+        ]
         for score in scores
         for name, metrics in score.differences.items()
     ]
@@ -43,7 +49,8 @@ def differences_part(scores: Sequence[ScoreFile]) -> list[str]:
         "## What the parts bring",
         "By how much a method is above another, both measured on the same resamples of the scenes. "
         "Most of what makes a scene hard is hard for both and cancels out, so these intervals "
-        "decide where those of the other tables overlap. Bold: 0 is outside.",
+        f"decide where those of the other tables overlap. Bold: 0 is outside, for at least "
+        f"{_FEWEST_SCENES} scenes and {_FEWEST_REPLICATES} resamples.",
         markdown_table(head, rows, left=2),
         *_verdicts(scores),
     ]
@@ -54,21 +61,23 @@ def _verdicts(scores: Sequence[ScoreFile]) -> list[str]:
     sentences = []
     for score in scores:
         for name, metrics in score.differences.items():
-            decided = [c.heading for c in _COLUMNS if _is_decided(metrics.get(c.metric))]
+            decided = [c.heading for c in _COLUMNS if _is_decided(score, metrics.get(c.metric))]
             words = f"is decided in {listed(decided)}" if decided else "is decided in none"
             sentences.append(f"`{score.method}` against `{name}` {words}.")
     return [" ".join(sentences)]
 
 
-def _cell(measured: Measured | None, column: Column) -> str:
+def _cell(score: ScoreFile, measured: Measured | None, column: Column) -> str:
     if measured is None or measured.value is None:
         return "-"
     text = measured_cell(measured, column.factor, digits=column.digits)
     signed = text if text.startswith("-") else f"+{text}"
-    return f"**{signed}**" if _is_decided(measured) else signed
+    return f"**{signed}**" if _is_decided(score, measured) else signed
 
 
-def _is_decided(measured: Measured | None) -> bool:
+def _is_decided(score: ScoreFile, measured: Measured | None) -> bool:
+    if score.scenes < _FEWEST_SCENES or score.replicates < _FEWEST_REPLICATES:
+        return False
     if measured is None or measured.low is None or measured.high is None:
         return False
     return measured.low > 0 or measured.high < 0

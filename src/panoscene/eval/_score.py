@@ -187,7 +187,7 @@ def score_records(
     """
     records, names = measured.records, measured.names
     for name, other in others.items():
-        if other.names != names:
+        if other.names != names or _hash(other.targets, names) != _hash(measured.targets, names):
             raise ValueError(f"{name}: was measured on other targets")
 
     def metrics(chosen: Sequence[SceneRecords]) -> dict[str, Measured]:

@@ -1,6 +1,8 @@
 """Surfaces of fields, and the stage from photo to shapes."""
 
 import math
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +23,8 @@ from panoscene.models.shape import (
     load_shape_stage,
     thin_boxes,
 )
+from panoscene.models.shape._extract import _level
+from panoscene.models.shape._threads import alone
 from panoscene.scene import (
     CATEGORIES,
     Layout,
@@ -202,9 +206,15 @@ def test_the_number_of_threads_changes_nothing(network: ShapeNetwork) -> None:
 def test_the_stage_is_the_network_without_norms(tmp_path: Path) -> None:
     network = build_shape(CONFIGS["compact"])
     image = torch.rand(3, 64, 128, generator=torch.Generator().manual_seed(3))
+    generator = torch.Generator().manual_seed(4)
     for module in network.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
-            torch.nn.init.uniform_(module.bias, 0, 0.2, generator=torch.Generator().manual_seed(4))
+            assert module.running_mean is not None
+            assert module.running_var is not None
+            module.running_mean.uniform_(-0.1, 0.1, generator=generator)
+            for numbers in (module.running_var, module.weight):
+                torch.nn.init.uniform_(numbers, 0.8, 1.2, generator=generator)
+            torch.nn.init.uniform_(module.bias, 0, 0.2, generator=generator)
     path = tmp_path / "shape.safetensors"
     write_weights(path, network, WeightsHeader(stage="shape", edition="compact"))
     stage = load_shape_stage("compact", path)
@@ -212,7 +222,7 @@ def test_the_stage_is_the_network_without_norms(tmp_path: Path) -> None:
     some = objects([0.2, -1.0], [[0.6, 0.6, 0.9], [1.0, 0.5, 0.7]])
     plain = ShapeStage(network).codes(image, some)
     away = (stage.codes(image, some) - plain).abs().max()
-    assert float(away) < 0.01 * float(plain.std())
+    assert float(away) < 1e-3 * float(plain.std())
 
 
 def test_weights_are_read_and_others_refused(network: ShapeNetwork, tmp_path: Path) -> None:
@@ -223,3 +233,46 @@ def test_weights_are_read_and_others_refused(network: ShapeNetwork, tmp_path: Pa
     with pytest.raises(CheckpointError, match="compact"):
         load_shape_stage("paper", path)
     assert box_mesh().faces.shape == (12, 3)
+
+
+def test_crumbs_alone_are_no_solid() -> None:
+    config, nodes = CONFIGS["compact"], 33
+    values = torch.full((nodes, nodes, nodes), 0.05)
+    values[2:-2:3, 2:-2:3, 2:-2:3] = -0.08  # each a crumb among hundreds, all over the box
+    values[6:27, 6:27, 6:27] = values[6:27, 6:27, 6:27].clamp(max=-0.06)
+    level, _, solid = _level(values, config)
+    assert level > -0.06
+    assert int((solid < 0).sum()) >= 21**3
+
+
+def test_threads_that_work_alone_give_back_what_they_took() -> None:
+    before, found, entered = torch.get_num_threads(), [], threading.Event()
+
+    def first() -> None:
+        with alone() as threads:
+            found.append(threads)
+            entered.set()
+            time.sleep(0.1)
+        found.append(torch.get_num_threads())
+
+    def second() -> None:
+        entered.wait()
+        with alone() as threads:
+            found.append(threads)
+            time.sleep(0.2)
+        found.append(torch.get_num_threads())
+
+    torch.set_num_threads(3)
+    try:
+        workers = [threading.Thread(target=work) for work in (first, second)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        later = threading.Thread(target=lambda: found.append(torch.get_num_threads()))
+        later.start()
+        later.join()
+        assert found == [3] * 5
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before)

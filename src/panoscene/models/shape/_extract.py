@@ -275,7 +275,9 @@ def _solid(values: Float[Tensor, "n n n"], level: float) -> tuple[Float[Tensor, 
             some = torch.from_numpy(crumb).to(values.device)
             part.copy_(torch.where(some, part.abs() + 1e-6, part))
             inside[bounds] &= ~crumb
-            bounds = _bounds(inside) or bounds
+            bounds = _bounds(inside)
+            if bounds is None:
+                return values, 0
     return values, min(part.stop - part.start for part in bounds)
 
 

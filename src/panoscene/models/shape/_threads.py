@@ -1,5 +1,6 @@
 """Pieces of work side by side: threads that help one another on small tensors mostly wait."""
 
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -11,16 +12,37 @@ Piece = TypeVar("Piece")
 Found = TypeVar("Found")
 
 
+class _Alone:
+    """How many blocks PyTorch works alone in, and how many threads it has otherwise."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.blocks = 0
+        self.threads = 1
+
+
+_ALONE = _Alone()
+
+
 @contextmanager
 def alone() -> Iterator[int]:
-    """Let PyTorch work with one thread here; gives how many there are otherwise."""
-    threads = torch.get_num_threads()
+    """Let PyTorch work with one thread here; gives how many there are otherwise.
+
+    Threads may be in such blocks at the same time. A new one begins with the number that was set
+    last, so it is the first of them that sees how many there are.
+    """
+    with _ALONE.lock:
+        if _ALONE.blocks == 0:
+            _ALONE.threads = torch.get_num_threads()
+        _ALONE.blocks += 1
+        threads = _ALONE.threads
     torch.set_num_threads(1)
     try:
         yield threads
     finally:
-        # what new threads begin with is one number for all
-        torch.set_num_threads(threads)
+        with _ALONE.lock:
+            _ALONE.blocks -= 1
+            torch.set_num_threads(threads)
 
 
 def side_by_side(

@@ -123,6 +123,8 @@ def _load_glb(content: bytes, name: str) -> LoadedModel:
         material, uv = _glb_material(mesh)
         normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(transform[:3, :3])
         positions = np.asarray(mesh.vertices) @ transform[:3, :3].T + transform[:3, 3]
+        if not all(np.isfinite(numbers).all() for numbers in (positions, uv)):
+            raise AssetError(name, f"found numbers that are not finite in {node}")
         faces = np.asarray(mesh.faces)
         label = np.full(len(faces), len(names))
         pieces.append(Triangles(positions[faces], uv[faces], normals[faces], label))
