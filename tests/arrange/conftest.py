@@ -56,6 +56,7 @@ def random_batch(
         score=rand(scenes, n),
         distance_score=rand(scenes, n),
         yaw_score=rand(scenes, n),
+        built_in=torch.zeros(scenes, n, dtype=torch.bool),
         touching=(touching + touching.transpose(-1, -2)) / 2,
         touching_wall=0.2 + 0.8 * rand(scenes, n, m),
         on_floor=rand(scenes, n),

@@ -24,6 +24,7 @@ from panoscene.geometry import OrientedBoxes, paired_box_iou
 from panoscene.scene import (
     Layout,
     Scene,
+    category_index,
     objects_from_boxes,
     relations_from_boxes,
     scene_from_boxes,
@@ -420,6 +421,24 @@ def test_the_doubtful_object_gives_way():
         (result.scene.objects.boxes.centre - sure.objects.boxes.centre).norm(dim=-1).tolist()
     )
     assert second > 3 * first
+
+
+def test_what_is_before_a_door_makes_room():
+    scene = scene_of((0, 1.2, 0.5, 1, 1, 1, 0), (0.6, 1.2, 0.5, 1, 1, 1, 0))
+    before_door = with_objects(
+        scene, category=torch.tensor([category_index("door"), category_index("chest")])
+    )
+    moved = {}
+    for pace in (1.0, 0.1, 0.0):
+        settings = PRESETS["default"].model_copy(update={"built_in_pace": pace})
+        found = arrange(before_door, settings)
+        assert found.certificate.after.colliding_pairs == 0
+        centre = found.scene.objects.boxes.centre
+        moved[pace] = (centre - scene.objects.boxes.centre).norm(dim=-1).tolist()
+    door = {pace: first for pace, (first, _) in moved.items()}
+    assert door[1.0] > 0.04
+    assert door[0.1] < 0.5 * door[1.0]
+    assert door[0.0] < 1e-5
 
 
 def stuck_scene() -> Scene:

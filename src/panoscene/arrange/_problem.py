@@ -82,9 +82,8 @@ class Problem:
     @property
     def pace(self) -> Float[Tensor, "scenes n"]:
         """Part of a step that each object goes."""
-        score = self.batch.score
-        share = self.settings.firmness
-        return 1 - share * score
+        pace = 1 - self.settings.firmness * self.batch.score
+        return torch.where(self.batch.built_in, pace * self.settings.built_in_pace, pace)
 
     @property
     def off_walls(self) -> float:

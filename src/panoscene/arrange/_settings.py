@@ -119,6 +119,9 @@ class ArrangementSettings(_Frozen):
     firmness: float = Field(default=0.0, ge=0, lt=1)
     """Part by which an object of detection score 1 moves more slowly than one of score 0, so that
     of two in each other's way the doubtful one makes room."""
+    built_in_pace: float = Field(default=1.0, ge=0, le=1)
+    """Part of a step that doors and windows go: with a small one, what is in their way makes
+    room."""
     collision: Literal["sum", "depth"] = "sum"
     """Object-object collision: overlap summed over the separating axes (paper), or the
     smallest one, which is how far the boxes must really move."""

@@ -19,6 +19,7 @@ from panoscene.models.context import (
     relation_probabilities,
 )
 from panoscene.models.context._walls import closed_polygon, walls_of
+from panoscene.scene import built_in
 
 ARRANGED_WEIGHT = 10.0
 """Of each loss on arranged boxes (supplement, table of the outputs and loss weights)."""
@@ -59,6 +60,7 @@ def arrangement_batch(
         score=estimates.score,
         distance_score=output.output.distance_logit.softmax(dim=-1).amax(dim=-1),
         yaw_score=output.output.yaw_logit.softmax(dim=-1).amax(dim=-1),
+        built_in=built_in(estimates.category) & valid,
         **{part.name: getattr(relations, part.name) for part in fields(relations)},
         polygon=closed_polygon(estimates.polygon, estimates.wall_valid),
         walls=walls,
