@@ -436,7 +436,7 @@ def test_what_is_before_a_door_makes_room():
         centre = found.scene.objects.boxes.centre
         moved[pace] = (centre - scene.objects.boxes.centre).norm(dim=-1).tolist()
     assert moved[1.0][0] > 0.04
-    assert moved[0.0][0] < 1e-5
+    assert moved[0.0][0] < 1e-3
     assert moved[0.0][1] > moved[1.0][1]
 
 
