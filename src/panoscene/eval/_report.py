@@ -216,9 +216,20 @@ def _intervals(scores: Sequence[ScoreFile]) -> str:
     return (
         f"In brackets the 95 % interval of {' or '.join(map(str, counts))} bootstrap resamples of "
         f"the scenes{none}. It is left out where it is narrower than the last digit; intervals of "
-        f"single labels and corner groups are in {files}. Numbers of targets and single "
+        f"single labels and corner groups are in {files}. {_bare(scores)} and single "
         "categories have none."
     )
+
+
+def _bare(scores: Sequence[ScoreFile]) -> str:
+    """Return what has no intervals besides categories; older files have fewer."""
+    resampled = [
+        one
+        for score in scores
+        if score.replicates and (one := score.metrics.get("detection.matched_iou")) is not None
+    ]
+    known = all(one.low is not None for one in resampled if one.value is not None)
+    return "Numbers of targets" if known else "Numbers of targets, matched IoU"
 
 
 def _detection_part(scores: Sequence[ScoreFile]) -> list[str]:
