@@ -358,9 +358,9 @@ def test_differences_have_a_table_that_says_which_are_decided() -> None:
     open_ = Measured(value=0.004, low=-0.01, high=0.02)
     metrics = {"plausibility.paper_colliding_pairs": sure, "detection.ap_15_mean_57": open_}
     few = rendered("full").model_copy(update={"differences": {"pose": metrics}})
-    assert "is decided in none" in part(results_page([few, rendered("pose")]), heading)
+    assert "neither above nor below it" in part(results_page([few, rendered("pose")]), heading)
     full = few.model_copy(update={"scenes": 110, "replicates": 1000})
     text = part(results_page([full, rendered("pose")]), heading)
     assert "| `full` | `pose` | +0.4 [-1.0, 2.0] | **-1.94 [-2.30, -1.60]** |" in text
-    assert "`full` against `pose` is decided in colliding pairs." in text
+    assert "`full` against `pose`: below it in colliding pairs." in text
     assert "What the parts bring" not in results_page([rendered("full"), rendered("pose")])

@@ -19,7 +19,7 @@ from panoscene.scene import (
 )
 from panoscene.synth.dataset import PanoramaItem
 
-SHAPED = ("full", "without-arrangement", "true-detections")
+SHAPED = ("full", "without-arrangement")
 """Rows whose objects have meshes, if the pipeline makes some; the others are boxes."""
 
 
@@ -120,7 +120,7 @@ def predicted_rows(item: PanoramaItem, truth: Scene, pipeline: Pipeline) -> dict
         "true-layout": unshaped(
             image, photo, given=replace(in_true_frame, layout=truth.layout), name=item.name
         ).scene,
-        "true-detections": pipeline(
+        "true-detections": unshaped(
             image, photo, given=replace(in_true_frame, detections=true_seen), name=item.name
         ).scene,
         "true-boxes": alone(image, photo, given=told_boxes, name=item.name).scene,

@@ -37,7 +37,9 @@ ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
         "true-layout": ExportedMethod(
             "oracle", "the whole pipeline in the true room", shapes=False
         ),
-        "true-detections": ExportedMethod("oracle", "the whole pipeline on the true BFoVs"),
+        "true-detections": ExportedMethod(
+            "oracle", "the whole pipeline on the true BFoVs", shapes=False
+        ),
         "true-boxes": ExportedMethod(
             "oracle", "the true boxes in the room that the pipeline sees", shapes=False
         ),

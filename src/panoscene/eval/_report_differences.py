@@ -61,10 +61,25 @@ def _verdicts(scores: Sequence[ScoreFile]) -> list[str]:
     sentences = []
     for score in scores:
         for name, metrics in score.differences.items():
-            decided = [c.heading for c in _COLUMNS if _is_decided(score, metrics.get(c.metric))]
-            words = f"is decided in {listed(decided)}" if decided else "is decided in none"
-            sentences.append(f"`{score.method}` against `{name}` {words}.")
+            above, below = [], []
+            for column in _COLUMNS:
+                measured = metrics.get(column.metric)
+                if measured is not None and _is_decided(score, measured):
+                    (above if (measured.value or 0) > 0 else below).append(_short(column.heading))
+            sides = [
+                f"{side} it in {listed(columns)}"
+                for side, columns in (("above", above), ("below", below))
+                if columns
+            ]
+            where = "; ".join(sides) or "neither above nor below it"
+            sentences.append(f"`{score.method}` against `{name}`: {where}.")
     return [" ".join(sentences)]
+
+
+def _short(heading: str) -> str:
+    """Return a heading without its unit."""
+    name, _, rest = heading.partition(", ")
+    return f"{name} ({rest})" if rest.endswith("cat.") else name
 
 
 def _cell(score: ScoreFile, measured: Measured | None, column: Column) -> str:
