@@ -151,6 +151,20 @@ def test_volumes_need_closed_meshes() -> None:
     assert volume_iou(moved(box, 3.0, 0.0, 0.0), box) == 0
 
 
+def test_parts_that_touch_in_an_edge_enclose_space() -> None:
+    # four triangles meet in the edge, as where two sheets of a simplified shape touch
+    cube = box_mesh()
+    other = moved(cube, 1.0, 1.0, 0.0)
+    both = Mesh(
+        torch.cat([cube.vertices, other.vertices]),
+        torch.cat([cube.faces, other.faces + len(cube.vertices)]),
+    )
+    welded = mesh_from(trimesh.Trimesh(both.vertices.numpy(), both.faces.numpy(), process=True))
+    for mesh in (both, welded):
+        assert volume_iou(mesh, mesh) == pytest.approx(1.0)
+        assert volume_iou(mesh, cube) == pytest.approx(0.5, abs=0.02)
+
+
 @pytest.mark.parametrize("vertices", [torch.zeros(0, 3), torch.full((3, 3), math.nan)])
 def test_shapes_without_a_surface_are_missed(
     vertices: torch.Tensor, generator: torch.Generator

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-import trimesh
 from jaxtyping import Float
 from torch import Tensor
 
-from panoscene.eval._solids import Solid, common_space
+from panoscene.eval._solids import Solid, common_space, mesh_solid
 from panoscene.eval._surface_distance import SurfaceSamples, sample_surface, surface_distance
 from panoscene.scene import Mesh
 
@@ -43,7 +42,7 @@ class ShapeErrors:
 
 def missed_shape(target: Mesh) -> ShapeErrors:
     """Return the errors of a shape that was not predicted: infinitely far, nothing in common."""
-    volume = 0.0 if _closed(target) is not None else None
+    volume = 0.0 if mesh_solid(target) is not None else None
     return ShapeErrors(math.inf, math.inf, 0.0, 0.0, volume)
 
 
@@ -62,9 +61,10 @@ def shape_errors(
     normals use the distance from the samples to the other surface itself: between samples,
     10,000 points on a unit cube agree with 10,000 others within 0.01 in two of five cases only.
 
-    Volumes are compared when both meshes are closed (watertight, faces agreeing on the outside):
-    exactly along a grid of 64 x 64 vertical lines. A prediction that is not closed encloses
-    nothing and gets 0 where the target is closed.
+    Volumes are compared when both meshes are closed, that is, each edge is walked as often in one
+    direction as in the other (parts may touch in an edge): exactly along a grid of 64 x 64
+    vertical lines. A prediction that is not closed encloses nothing and gets 0 where the target
+    is closed.
 
     Args:
         prediction: Mesh; one without finite triangles counts as missed.
@@ -105,10 +105,10 @@ def volume_iou(prediction: Mesh, target: Mesh) -> float | None:
         >>> round(volume_iou(Mesh(box.vertices + torch.tensor([0.5, 0.0, 0.0]), box.faces), box), 2)
         0.33
     """
-    truth = _closed(target)
+    truth = mesh_solid(target)
     if truth is None:
         return None
-    found = _closed(prediction)
+    found = mesh_solid(prediction)
     if found is None:
         return 0.0
     own, true, shared = (
@@ -149,15 +149,3 @@ def _one_way(
 
 def _mean(values: Tensor) -> float:
     return float(values.mean())
-
-
-def _closed(mesh: Mesh) -> Solid | None:
-    """Return the solid that a mesh encloses, or None when it is not closed."""
-    vertices = mesh.vertices.detach().to("cpu", torch.float64)
-    if len(mesh.faces) == 0 or not bool(vertices.isfinite().all()):
-        return None
-    surface = trimesh.Trimesh(vertices.numpy(), mesh.faces.cpu().numpy(), process=True)
-    if not (surface.is_watertight and surface.is_winding_consistent) or surface.volume == 0:
-        return None
-    triangles = np.asarray(surface.triangles, dtype=np.float64)
-    return Solid(triangles if surface.volume > 0 else triangles[:, ::-1], "mesh")

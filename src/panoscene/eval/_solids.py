@@ -29,8 +29,8 @@ def object_solid(objects: Objects, index: int) -> Solid:
     """Return one object as a closed mesh in the world frame.
 
     A mesh is used as it is when it is closed (``is_closed``); its parts may be several and may
-    overlap. Otherwise inside and outside are not defined, and the convex
-    hull takes its place; a mesh without volume has no hull either and becomes the box.
+    overlap. Otherwise inside and outside are not defined, and the convex hull takes its place; a
+    mesh without volume has no hull either and becomes the box.
     """
     boxes = objects.boxes[index]
     box = OrientedBoxes(
@@ -41,17 +41,28 @@ def object_solid(objects: Objects, index: int) -> Solid:
     mesh = objects.shapes.mesh[index] if objects.shapes.mesh else None
     if mesh is None or len(mesh.faces) == 0:
         return _box_solid(box)
-    vertices = place_vertices(mesh.vertices.detach().cpu(), box).numpy()
-    triangles = vertices[mesh.faces.cpu().numpy()]
-    volume = _volume(triangles)
-    if is_closed(mesh) and abs(volume) > _SMALLEST_VOLUME:
-        return Solid(triangles if volume > 0 else triangles[:, ::-1], "mesh")
+    placed = Mesh(place_vertices(mesh.vertices.detach().cpu(), box), mesh.faces)
+    own = mesh_solid(placed)
+    if own is not None:
+        return own
     try:
-        hull = trimesh.convex.convex_hull(vertices)
+        hull = trimesh.convex.convex_hull(placed.vertices.numpy())
     except QhullError:
         return _box_solid(box)
     triangles = np.asarray(hull.triangles, dtype=np.float64)
     return Solid(triangles, "hull") if hull.volume > _SMALLEST_VOLUME else _box_solid(box)
+
+
+def mesh_solid(mesh: Mesh) -> Solid | None:
+    """Return what a mesh encloses; None when it is not closed (``is_closed``) or has no volume."""
+    vertices = mesh.vertices.detach().cpu().double().numpy()
+    if len(mesh.faces) == 0 or not np.isfinite(vertices).all() or not is_closed(mesh):
+        return None
+    triangles = vertices[mesh.faces.cpu().numpy()]
+    volume = _volume(triangles)
+    if abs(volume) <= _SMALLEST_VOLUME:
+        return None
+    return Solid(triangles if volume > 0 else triangles[:, ::-1], "mesh")
 
 
 def is_closed(mesh: Mesh) -> bool:
