@@ -1,7 +1,9 @@
 """panoscene reconstruct: what it writes, what it refuses, and how it goes on."""
 
+import errno
 import io
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -196,21 +198,79 @@ def test_results_of_another_photo_do_not_count(made: Made, run: Run, tmp_path: P
 
 
 @pytest.mark.usefixtures("loaded", "drawn_here")
+def test_another_photo_of_the_same_name_is_made_anew(made: Made, run: Run, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(made.folder, tmp_path / "room"))
+    assert "nothing was done" in run(made.photo, "-o", folder, "--resume")[1]
+    other = tmp_path / made.photo.name
+    with Pillow.open(made.photo) as picture:
+        picture.transpose(Pillow.Transpose.FLIP_LEFT_RIGHT).save(other)
+    assert "flat: a room" in run(other, "-o", folder, "--steps", 0, "--resume")[1]
+    assert "nothing was done" in run(other, "-o", folder, "--resume")[1]
+
+
+def failing(
+    name: str, folder: Path, patch: pytest.MonkeyPatch, error: BaseException, at: int
+) -> list[Path]:
+    """Let a method of paths fail at its so-manieth draft in a folder; gives those it was told."""
+    drafts: list[Path] = []
+    whole = getattr(Path, name)
+
+    def method(path: Path, *arguments: object) -> object:
+        if path.suffix == ".part" and path.parent == folder:
+            drafts.append(path)
+            if len(drafts) == at:
+                raise error
+        return whole(path, *arguments)
+
+    patch.setattr(Path, name, method)
+    return drafts
+
+
+@pytest.mark.usefixtures("loaded", "drawn_here")
 def test_who_is_interrupted_over_older_results_leaves_no_scene(
     made: Made, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = Path(shutil.copytree(made.folder, tmp_path / "room"))
-    files: list[Path] = []
-
-    def interrupted(path: Path, data: bytes) -> None:
-        files.append(path)
-        if len(files) == 2:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr("panoscene.cli._results.write_bytes", interrupted)
+    moved = failing("replace", folder, monkeypatch, KeyboardInterrupt(), 2)
     assert run(made.photo, "-o", folder, "--steps", 0)[0] == 130
-    assert len(files) == 2
-    assert not (folder / "scene.json").exists()
+    assert len(moved) == 2
+    assert {file.name for file in folder.iterdir()} == FILES - {"scene.json"}
+
+
+@pytest.mark.usefixtures("loaded", "drawn_here")
+def test_a_full_disk_leaves_the_older_results(
+    made: Made, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = Path(shutil.copytree(made.folder, tmp_path / "room"))
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    written = failing("write_bytes", folder, monkeypatch, full, 7)
+    code, _, err = run(made.photo, "-o", folder, "--steps", 0)
+    assert (code, len(written)) == (2, 7)
+    assert err.endswith("cannot be written: no space left on device\n")
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+
+
+@pytest.mark.usefixtures("loaded", "drawn_here")
+def test_a_fault_of_the_program_costs_one_photo(
+    knowing: Knowing, run: Run, photo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = Path(shutil.copy(photo, tmp_path / "second.jpg"))
+    whole = knowing.layout
+
+    def faulty(*arguments: Any, **options: Any) -> object:
+        if len(knowing.asked) == 1:
+            knowing.asked.append("fault")
+            raise RuntimeError("no layout today")
+        return whole(*arguments, **options)
+
+    monkeypatch.setattr(knowing, "layout", faulty)
+    code, out, err = run(photo, other, "-o", tmp_path / "rooms", "--steps", 0, "--json")
+    assert code == 1
+    assert "Traceback" in err
+    assert f"error: {photo}: found a fault of panoscene" in err
+    assert [entry["ok"] for entry in json.loads(out)] == [False, True]
+    assert [folder.name for folder in (tmp_path / "rooms").iterdir()] == ["second"]
 
 
 def test_an_empty_name_of_a_photo_is_refused(run: Run) -> None:
@@ -322,3 +382,19 @@ def test_the_sample_photo_becomes_a_room(run: Run, tmp_path: Path) -> None:
     assert told["objects"] >= 3
     assert told["corners"] >= 4
     assert {file.name for file in (tmp_path / "room").iterdir()} == FILES
+
+
+def test_photos_in_which_nothing_is_found_become_empty_rooms(run: Run, tmp_path: Path) -> None:
+    threads = torch.get_num_threads()
+    plain, tiny = tmp_path / "plain.png", tmp_path / "tiny.png"
+    Pillow.new("RGB", (512, 256), (128, 128, 128)).save(plain)
+    with Pillow.open(sample_photo_path()) as picture:
+        picture.resize((64, 32)).save(tiny)
+    code, out, err = run(plain, tiny, "-o", tmp_path / "rooms", "--json")
+    torch.set_num_threads(threads)
+    assert code == 0, err
+    for told in json.loads(out):
+        assert {file.name for file in Path(told["output"]).iterdir()} == FILES
+    [empty, _] = json.loads(out)
+    assert empty["objects"] == 0
+    assert "nothing_found" in {flag["code"] for flag in empty["flags"]}

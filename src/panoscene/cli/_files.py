@@ -3,7 +3,8 @@
 import errno
 import json
 import os
-from collections.abc import Iterator
+import secrets
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,30 @@ def write_bytes(path: Path, data: bytes) -> None:
     """Write bytes to a file that appears complete or not at all."""
     with writing(path):
         write_atomically(path, data)
+
+
+def write_together(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files to a folder that all appear complete, or none; the last in the mapping at last.
+
+    Files that were there stay until all new ones are written beside them. Who is interrupted while
+    they are moved into place leaves none under the last name, rather than one that belongs to
+    others.
+    """
+    waiting: dict[Path, Path] = {}
+    try:
+        for name, data in contents.items():
+            with writing(folder / name):
+                draft = folder / f".{name}.{secrets.token_hex(4)}.part"
+                waiting[draft] = folder / name
+                draft.write_bytes(data)
+        for path in [*waiting.values()][-1:]:
+            path.unlink(missing_ok=True)
+        for draft, path in waiting.items():
+            with writing(path):
+                draft.replace(path)
+    finally:
+        for draft in waiting:
+            draft.unlink(missing_ok=True)
 
 
 def write_scene_from(source: Path, scene: Scene, target: Path) -> None:

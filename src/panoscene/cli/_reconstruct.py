@@ -2,6 +2,7 @@
 # The imports stand inside: who names a photo that cannot be used does not wait for torch.
 """Photos in, scenes out: which photos, where their results go, and what came of each."""
 
+import hashlib
 import json
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -88,6 +89,13 @@ def photo_folders(files: Sequence[Path], output: Path) -> dict[Path, Path]:
     return {file: output / file.stem for file in files}
 
 
+def account_of_photo(file: Path) -> dict[str, str]:
+    """Return what results say of the photo that they are of, so that no other is taken for it."""
+    with file.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    return {"photo": file.resolve().name, "photo_sha256": digest}
+
+
 @dataclass(frozen=True, slots=True)
 class Task:
     """One photo, and where its results go."""
@@ -104,8 +112,13 @@ class Task:
             account = json.loads((self.folder / ACCOUNT).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return True
-        name = self.file.resolve().name
-        return not isinstance(account, dict) or account.get("photo", name) == name
+        if not isinstance(account, dict):
+            return True
+        try:
+            own = account_of_photo(self.file)
+        except OSError:  # whoever reads it will say so
+            return False
+        return all(account.get(key, value) == value for key, value in own.items())
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +161,8 @@ def reconstruct_files(
     def tell(task: Task, outcome: Outcome) -> None:
         told[task.file] = outcome.entry
         if "error" in outcome.entry:
+            if "fault" in outcome.entry:
+                note(outcome.entry["fault"].rstrip())
             complain(outcome.entry["error"])
         for flag in outcome.entry.get("flags", ()):
             note(f"{task.file}: {flag['text']}")
@@ -167,7 +182,7 @@ def reconstruct_files(
     entries = [told.get(task.file) or _there(task) for task in tasks]
     if as_json:
         say_json(entries)
-        return 0 if all(entry["ok"] for entry in entries) else 2
+        return _code(entries)
     made = sum(entry["ok"] for entry in entries)
     kept = sum(not entry.get("new", True) for entry in entries)
     if len(files) > 1:
@@ -175,7 +190,7 @@ def reconstruct_files(
         say(f"wrote {output}: {made} of {len(files)} photos{before}")
     elif kept:
         say(f"{output}: the results are there, nothing was done")
-    return 0 if all(entry["ok"] for entry in entries) else 2
+    return _code(entries)
 
 
 def _refusal(task: Task) -> Outcome | None:
@@ -187,9 +202,15 @@ def _refusal(task: Task) -> Outcome | None:
     return None
 
 
-def failure(task: Task, error: str) -> Outcome:
-    """Return that nothing came of a photo."""
-    return Outcome({"photo": str(task.file), "ok": False, "error": error})
+def failure(task: Task, error: str, **more: str) -> Outcome:
+    """Return that nothing came of a photo, and what more programs are told."""
+    return Outcome({"photo": str(task.file), "ok": False, "error": error, **more})
+
+
+def _code(entries: Iterable[dict[str, Any]]) -> int:
+    """Return the exit code: 1 where the program failed, 2 where a photo could not be used."""
+    failed = [entry for entry in entries if not entry["ok"]]
+    return (1 if any("fault" in entry for entry in failed) else 2) if failed else 0
 
 
 def _there(task: Task) -> dict[str, Any]:

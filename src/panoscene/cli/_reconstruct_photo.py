@@ -1,6 +1,7 @@
 """One photo: from its pixels to files for people and programs in its folder."""
 
 import time
+import traceback
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from panoscene.cli._account import account
 from panoscene.cli._errors import InputError
 from panoscene.cli._reconstruct import ENOUGH_COLUMNS, SCENE, Outcome, Task, failure
 from panoscene.cli._results import results
+from panoscene.models import CheckpointError
 from panoscene.pipeline import Pipeline, Reconstruction, load_steps
 from panoscene.scene import CATEGORIES, PanoramaError, SceneFormatError, read_panorama
 from panoscene.style import words
@@ -30,7 +32,7 @@ def loading(pipeline: Pipeline) -> Iterator[None]:
 
 
 def reconstruct_photo(pipeline: Pipeline, task: Task, artist: Executor) -> Outcome:
-    """Return what came of a photo; what is wrong with it is told and does not stop the others."""
+    """Return what came of a photo; nothing that goes wrong with it stops the others."""
     file, folder, choice = task.file, task.folder, task.choice
     try:
         height = choice.camera_height
@@ -46,6 +48,13 @@ def reconstruct_photo(pipeline: Pipeline, task: Task, artist: Executor) -> Outco
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         return failure(task, f"{folder}: cannot be written: {reason}")
+    except CheckpointError:  # of weights, not of this photo
+        raise
+    except Exception as error:  # noqa: BLE001 - a fault of ours costs one photo, not the batch
+        said = " ".join(str(error).split())
+        found = f"{type(error).__name__}: {said}" if said else type(error).__name__
+        problem = f"{file}: found a fault of panoscene with this photo ({found}); please report it"
+        return failure(task, problem, fault=traceback.format_exc())
     entry = {
         "photo": str(file),
         "ok": True,

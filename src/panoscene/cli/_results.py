@@ -9,8 +9,8 @@ from tempfile import TemporaryDirectory
 
 from panoscene.cli._account import account
 from panoscene.cli._draw import draw_inside, draw_outside
-from panoscene.cli._files import write_bytes
-from panoscene.cli._reconstruct import ACCOUNT, SCENE
+from panoscene.cli._files import write_together
+from panoscene.cli._reconstruct import ACCOUNT, SCENE, account_of_photo
 from panoscene.cli._terminal import json_text
 from panoscene.exports import write_floor_plan_svg, write_glb
 from panoscene.pipeline import Reconstruction
@@ -37,17 +37,15 @@ class Results:
         shaped = self._artist.submit(_draw_shaped, _lean(result), drafts)
         draw_inside(scene, drafts)
         write_glb(scene, drafts / "scene.glb", image=result.image, texture_px_per_metre=TEXTURE)
-        head = {"schema": "panoscene/reconstruction", "version": 1, "photo": photo.resolve().name}
+        head = {"schema": "panoscene/reconstruction", "version": 1, **account_of_photo(photo)}
         document = head | account(result)
         (drafts / ACCOUNT).write_text(json_text(document) + "\n", encoding="utf-8")
         scene = relocate_photo(scene, photo.resolve(), folder.resolve() / SCENE)
         write_scene(scene, drafts / SCENE)
         for drawn in (self._placed, shaped):
             drawn.result()
-        # who is interrupted from here on leaves no scene, rather than files of two
-        (folder / SCENE).unlink(missing_ok=True)
-        for draft in sorted(drafts.iterdir(), key=lambda path: (path.name == SCENE, path.name)):
-            write_bytes(folder / draft.name, draft.read_bytes())
+        found = sorted(drafts.iterdir(), key=lambda path: (path.name == SCENE, path.name))
+        write_together(folder, {draft.name: draft.read_bytes() for draft in found})
 
 
 @contextmanager

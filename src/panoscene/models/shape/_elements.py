@@ -90,7 +90,8 @@ def analytic_code(
         torch.Size([2, 320])
     """
     parts = code.reshape(len(code), config.elements, config.width)
-    return parts[..., :ANALYTIC].reshape(len(code), -1)
+    # not a reshape to -1, which is refused where there is nothing
+    return parts[..., :ANALYTIC].flatten(1)
 
 
 def blob_centres(
