@@ -97,6 +97,22 @@ def test_data_is_prepared_and_thin_models_are_left_out(task: ShapeTask) -> None:
     assert task.rate("encoder.code.0.weight") == 1
 
 
+def test_the_first_models_are_of_all_categories(
+    task: ShapeTask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order = tuple(reversed(task.seen))
+    monkeypatch.setattr("panoscene.train._shape.shaped_models", lambda assets: ("other", *order))
+    options = task.options.model_dump(mode="json") | {"models": len(order) - 1}
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
+        data=SAMPLES, options=options,
+    )  # fmt: skip
+    fewer = shape_task(recipe)
+    assert isinstance(fewer, ShapeTask)
+    assert len(order) > 1
+    assert fewer.seen == list(order[:-1])
+
+
 @pytest.mark.train
 def test_overfits_two_models(task: ShapeTask) -> None:
     before = task.validate(task.model.eval(), None)

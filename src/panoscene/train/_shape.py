@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from panoscene.data import seed_of
 from panoscene.data._shape_crops import ObjectCrops, read_object_crops
-from panoscene.data._shape_data import MODELS, crops_file, prepare_shape_data
+from panoscene.data._shape_data import MODELS, crops_file, prepare_shape_data, shaped_models
 from panoscene.data._shape_samples import (
     Picture,
     SeenViews,
@@ -77,7 +77,7 @@ class ShapeOptions(BaseModel):
     """Crops of each picture for which a backbone that is not trained is run once, before the
     training; 0 trains the backbone, too."""
     models: int | None = None
-    """Learn from the first models only; None for all."""
+    """Learn from so many models only, of all categories in turn; None for all."""
 
 
 class ShapeTask(Task):
@@ -99,7 +99,11 @@ class ShapeTask(Task):
             raise TrainError(folder / MODELS, "found no models, expected some .npz files")
         entries = load_library(assets).entries
         self.metres = {name: max(entries[name].size) for name in self.shapes}
+        self.bases = {name: entries[name].base for name in self.shapes}
         seen = [name for name, shape in self.shapes.items() if shape.split == "seen"]
+        if self.options.models is not None:
+            known = frozenset(seen)
+            seen = [name for name in shaped_models(assets) if name in known]
         self.seen = seen[: self.options.models]
         self.unseen = [name for name in self.shapes if self.shapes[name].split == "unseen"]
         self.crops = _crops(folder, "train", recipe.panoramas)
