@@ -2,6 +2,7 @@
 
 import logging
 import os
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import ModuleType
@@ -9,6 +10,8 @@ from typing import Any, TypeVar
 
 _AGAIN = 3
 """Times that a task is tried again when its computer goes away."""
+_PATIENCE = 10.0
+"""Seconds in which a cluster must answer."""
 _Task = TypeVar("_Task")
 
 
@@ -43,14 +46,27 @@ def ray_cluster(ray: ModuleType, address: str | None) -> Iterator[None]:
     started = not ray.is_initialized()
     if started:
         try:
+            _knock(address)
             ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
-        except ConnectionError as error:
+        except (ConnectionError, OSError, ValueError) as error:
             raise ConnectionError(f"{address}: found no Ray cluster there") from error
     try:
         yield
     finally:
         if started:
             ray.shutdown()
+
+
+def _knock(address: str | None) -> None:
+    """Try whether anybody answers at an address, as the package would wait for minutes.
+
+    Raises:
+        OSError: Nobody does.
+        ValueError: The port is no number.
+    """
+    host, colon, port = (address or "").removeprefix("ray://").rpartition(":")
+    if colon:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE).close()
 
 
 def spread(

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -10,7 +11,8 @@ from torch import Tensor
 from panoscene.geometry import paired_box_iou
 from panoscene.models.layout import LayoutPrediction
 from panoscene.models.upright import UprightEstimate
-from panoscene.pipeline import Given, Pipeline
+from panoscene.pipeline import Given, Pipeline, load
+from panoscene.sample import sample_photo_path
 from panoscene.scene import (
     Detections,
     Mesh,
@@ -18,7 +20,9 @@ from panoscene.scene import (
     Scene,
     Shapes,
     box_mesh,
+    read_panorama,
     select_objects,
+    write_scene,
 )
 
 from .conftest import Image, Knowing
@@ -118,3 +122,15 @@ def test_the_same_photo_gives_the_same_scene(truth: Scene, image: Tensor) -> Non
         assert torch.equal(one.objects.boxes.yaw, two.objects.boxes.yaw)
     assert torch.equal(first.image, second.image)
     assert first.flags == second.flags
+
+
+def test_the_shipped_networks_give_the_same_scene_again(tmp_path: Path) -> None:
+    photo, panorama = read_panorama(sample_photo_path())
+    pipeline = load()
+    found = []
+    for name in ("first", "second"):
+        scene = pipeline(photo, panorama, resolution=32).scene
+        assert len(scene.objects.boxes) > 3
+        write_scene(scene, tmp_path / f"{name}.json")
+        found.append((tmp_path / f"{name}.json").read_bytes())
+    assert found[0] == found[1]

@@ -2,9 +2,11 @@
 
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+from panoscene._ray import ray_cluster
 from panoscene.cli import main
 from panoscene.cli._reconstruct import Choice, Task, reconstruct_there
 from panoscene.pipeline import Pipeline
@@ -21,6 +23,18 @@ def test_folders_that_are_not_shared_are_noticed(tmp_path: Path) -> None:
     entry = reconstruct_there("run", make, task).entry
     assert not entry["ok"]
     assert "expected a shared folder" in entry["error"]
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "ray://here:there"])
+def test_a_cluster_that_does_not_answer_is_refused_at_once(address: str) -> None:
+    ray = ModuleType("ray")
+    ray.is_initialized = lambda: False  # ty: ignore[unresolved-attribute]
+    ray.init = lambda **_: pytest.fail("waits for minutes")  # ty: ignore[unresolved-attribute]
+    with (
+        pytest.raises(ConnectionError, match=f"{address}: found no Ray cluster there"),
+        ray_cluster(ray, address),
+    ):
+        pass
 
 
 def test_a_missing_package_is_named(

@@ -22,12 +22,15 @@ ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
         ),
         "pose-arranged": ExportedMethod(
             "ours",
-            "the pose network's boxes, arranged with relations that follow from them",
+            "the pose network's boxes of what `full` keeps, arranged with relations that follow "
+            "from them",
             compared_with=("pose",),
             shapes=False,
         ),
         "pose": ExportedMethod(
-            "input", "the pose network's boxes alone, relations by a geometric rule"
+            "input",
+            "the pose network's boxes alone of what `full` keeps (doubles are out), relations by a "
+            "geometric rule",
         ),
         "mean-box": ExportedMethod(
             "baseline",

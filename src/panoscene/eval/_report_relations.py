@@ -63,7 +63,7 @@ def _flawed_truth(scores: Sequence[ScoreFile]) -> str:
 
 
 def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str:
-    """Return in which F1 our relations are ahead of the rule, and in which not.
+    """Return in which F1 our relations are ahead of the rule, for sure or not, and in which not.
 
     Empty where the page is not about rendered homes.
     """
@@ -84,10 +84,12 @@ def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str
                 continue
             both = rows[name].differences.get(_RULE, {}).get(column.metric)
             (ahead if ours.value > theirs.value else behind).append((column, ours, theirs, both))
-        words = f"`{name}` is ahead in {listed([_relation(column) for column, *_ in ahead])}"
-        if behind:
-            words += f", not in {listed([_lost(*found) for found in behind])}"
-        verdicts.append(words)
+        sure = [_relation(column) for column, *_, both in ahead if not _chance(both)]
+        narrow = [_gained(column, both) for column, *_, both in ahead if both and _chance(both)]
+        words = [f"ahead in {listed(sure)}"] if sure else []
+        words += [f"ahead by no more than chance may bring in {listed(narrow)}"] if narrow else []
+        words += [f"not in {listed([_lost(*found) for found in behind])}"] if behind else []
+        verdicts.append(f"`{name}` is " + ", ".join(words))
     if not verdicts:
         return ""
     return f"F1 against the rule of geometry on the boxes of `{_RULE}`: {'; '.join(verdicts)}."
@@ -100,6 +102,15 @@ def _lost(column: Column, ours: Measured, theirs: Measured, both: Measured | Non
     )
     difference = "" if both is None else f", difference {measured_cell(both, column.factor)}"
     return f"{_relation(column)} ({first} to {second}{difference})"
+
+
+def _chance(difference: Measured | None) -> bool:
+    """Return whether the interval of a gain reaches below nothing."""
+    return difference is not None and difference.low is not None and difference.low <= 0
+
+
+def _gained(column: Column, both: Measured) -> str:
+    return f"{_relation(column)} ({measured_cell(both, column.factor)})"
 
 
 def _relation(column: Column) -> str:

@@ -49,6 +49,10 @@ def arrangement_batch(
     relations = relation_probabilities(
         output.relations, output.valid, output.wall_valid, calibration
     )
+    in_wall = built_in(estimates.category) & valid
+    scores = {part.name: getattr(relations, part.name) for part in fields(relations)}
+    # as in the pipeline, walls do not push those who stand in them
+    scores["inside_room"] = scores["inside_room"].masked_fill(in_wall, 0)
     return ArrangementBatch(
         boxes=OrientedBoxes(
             torch.where(keep, found.centre, _BELOW),
@@ -60,8 +64,8 @@ def arrangement_batch(
         score=estimates.score,
         distance_score=output.output.distance_logit.softmax(dim=-1).amax(dim=-1),
         yaw_score=output.output.yaw_logit.softmax(dim=-1).amax(dim=-1),
-        built_in=built_in(estimates.category) & valid,
-        **{part.name: getattr(relations, part.name) for part in fields(relations)},
+        built_in=in_wall,
+        **scores,
         polygon=closed_polygon(estimates.polygon, estimates.wall_valid),
         walls=walls,
         wall_valid=estimates.wall_valid,

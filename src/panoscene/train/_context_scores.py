@@ -19,6 +19,7 @@ from panoscene.eval import (
     score_relations,
 )
 from panoscene.geometry import OrientedBoxes, paired_box_iou
+from panoscene.pipeline._relations import held_relations
 from panoscene.scene import (
     Detections,
     Objects,
@@ -112,8 +113,13 @@ def with_oracle(scenes: Sequence[Scene], truth: Sequence[Scene]) -> list[Scene]:
 
 
 def arranged(scenes: Sequence[Scene], settings: ArrangementSettings | str) -> list[Scene]:
-    """Return scenes after the arrangement; their relations are kept."""
-    return [found.scene for found in arrange_scenes(scenes, settings)]
+    """Return scenes after the arrangement of the pipeline; they keep their own relations."""
+    held = [replace(scene, relations=held_relations(scene)) for scene in scenes]
+    found = arrange_scenes(held, settings)
+    return [
+        replace(result.scene, relations=scene.relations)
+        for result, scene in zip(found, scenes, strict=True)
+    ]
 
 
 def relation_quality(scores: dict[str, float]) -> float:
