@@ -12,10 +12,15 @@ import json
 from pathlib import Path
 from typing import Any
 
+from panoscene.data import shaped_models
+from panoscene.data._shape_data import MODELS
+from panoscene.data._shape_store import store_file
 from panoscene.scene import write_atomically
+from panoscene.synth.assets import load_library
 from panoscene.synth.dataset import open_dataset
 from panoscene.train import SELECTION, Stage, TrainError, TrainRecipe, read_train_recipe
 from panoscene.train._panoramas import training_panoramas
+from panoscene.train._shape import ShapeOptions
 
 FILE = Path(__file__).with_suffix(".json")
 SELECTIONS: dict[Stage, str] = {
@@ -74,6 +79,7 @@ def curve(run: Path, data: Path | None) -> dict[str, Any]:
         "edition": recipe.edition,
         "panoramas": panoramas_of(recipe, data or recipe.data),
         "homes_version": homes_version_of(data or recipe.data),
+        "models": models_of(recipe),
         "steps": recipe.steps,
         "batch_size": recipe.batch_size,
         "started": recipe.start is not None,
@@ -89,6 +95,20 @@ def panoramas_of(recipe: TrainRecipe, data: Path | None) -> int:
     if data is None:
         raise TrainError("recipe", "data: found none, expected --data with the data set")
     return len(training_panoramas(data, recipe))
+
+
+def models_of(recipe: TrainRecipe) -> int | None:
+    """Return how many models a training of shapes learned from; None for other stages."""
+    if recipe.stage != "shape":
+        return None
+    options = recipe.stage_options(ShapeOptions)
+    library = load_library(options.assets.expanduser())
+    seen = sum(
+        library.split[library.entries[name].base] == "seen"
+        and store_file(options.folder / MODELS, name).is_file()
+        for name in shaped_models(options.assets.expanduser())
+    )
+    return seen if options.models is None else min(options.models, seen)
 
 
 def homes_version_of(data: Path | None) -> int:

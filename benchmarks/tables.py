@@ -15,6 +15,7 @@
         --output benchmarks/pose-test.json
     python benchmarks/upright.py FOLDER-OF-A-RENDERED-SET
     python benchmarks/curves.py NAME=RUN_FOLDER ...
+    python benchmarks/rolls.py DATA
     python benchmarks/shape_scores.py RECIPE WEIGHTS
     python benchmarks/tables.py
 
@@ -37,6 +38,7 @@ from panoscene.eval import (
 from panoscene.scene import CATEGORIES, MEAN_SIZE
 from panoscene.synth.dataset import plan_homes, read_recipe
 from panoscene.synth.production import synth_benchmark_table
+from panoscene.train._shape_tables import shape_tables
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (
@@ -55,11 +57,6 @@ PAGES = (
     "model_cards/shape-compact.md",
 )
 
-SHAPE_KINDS = {
-    "crops": "objects in validation panoramas",
-    "unseen": "pictures of unseen models",
-    "seen": "pictures of training models",
-}
 POSE_ROWS = {
     "true_room": "true layout",
     "no_crops": "true layout, no crops",
@@ -99,7 +96,8 @@ def tables() -> dict[str, str]:
         **detector_text(),
         **layout_text(),
         **pose_text(),
-        **shape_text(),
+        **rolls_text(),
+        **shape_tables(_measured("shape_scores")),
         **synth_text(),
         **seconds_text("stages"),
         **seconds_text("pipeline"),
@@ -211,15 +209,16 @@ def _layout_row(part: str, rooms: int, values: list[float]) -> str:
 def pose_text() -> dict[str, str]:
     """Return the pose network's scores on each part of the set, and on what the networks find."""
     parts = [_measured(f"pose{part}") for part in ("-train", "", "-test")]
-    head = "| part | objects | input | tied AP@0.15 | AP@0.15 | AP@0.25 | AP@0.5 | front for back |"
-    lines = [head, "| --- " * 8 + "|"]
+    tied = ("ap_15", "ap_25", "ap_50")
+    head = "| part | objects | input | tied AP@0.15 | tied AP@0.25 | tied AP@0.5 | AP@0.15 |"
+    lines = [f"{head} AP@0.25 | AP@0.5 | front for back |", "| --- " * 10 + "|"]
     for found in parts:
         for name, words in POSE_ROWS.items():
             row = found["rows"][name]
             turned = f"{row['front_back']:.1%}".replace("%", " %")
             lines.append(
-                f"| {_part(found)} | {found['objects']} | {words} | {row['ap_15']:.3f} |"
-                f" {_ranked(row)} | {turned} |"
+                f"| {_part(found)} | {found['objects']} | {words} |"
+                f" {' | '.join(f'{row[key]:.3f}' for key in tied)} | {_ranked(row)} | {turned} |"
             )
     rows = parts[2]["rows"]
     columns = ("AP@0.15", "AP@0.25", "AP@0.5", "centre", "distance", "size", "yaw")
@@ -246,6 +245,38 @@ def _ranked(row: dict[str, float]) -> str:
     return " | ".join(f"{row[f'ranked_ap_{percent}']:.3f}" for percent in (15, 25, 50))
 
 
+def rolls_text() -> dict[str, str]:
+    """Return how much of what is found turns with the panorama, for detector and layout."""
+    measured = _measured("rolls")
+    count = measured["panoramas"]
+    shares = list(measured["angles"][0]["found_again"])
+    detector = [f"| rolled by | of its picture | {' | '.join(f'above {o}' for o in shares)} |"]
+    layout = ["| rolled by | of its picture | mean 3D IoU | least | as many corners |"]
+    detector.append("| --- " * (2 + len(shares)) + "|")
+    layout.append("| --- " * 5 + "|")
+    for row in measured["angles"]:
+        places = {
+            name: f"| {row['angle_deg']:.1f}° | {pixels:g} pixels{_whole(row, name)}"
+            for name, pixels in row["pixels"].items()
+        }
+        sure = row["sure_detections"]
+        again = (f"{n} of {sure} ({100 * n / sure:.0f} %)" for n in row["found_again"].values())
+        detector.append(f"{places['detector']} | {' | '.join(again)} |")
+        layout.append(
+            f"{places['layout']} | {row['layout_iou_3d']:.3f} | {row['layout_iou_3d_least']:.3f}"
+            f" | {row['layout_same_corners']} of {count} |"
+        )
+    where = f"\n\n{count} panoramas of {_part(measured)} (`python benchmarks/rolls.py DATA`)."
+    return {
+        "detector-rolls": "\n".join(detector) + where,
+        "layout-rolls": "\n".join(layout) + where,
+    }
+
+
+def _whole(row: dict[str, Any], name: str) -> str:
+    return ", whole strides" if row["whole_strides"][name] else ""
+
+
 def _measured(name: str) -> dict[str, Any]:
     return json.loads((ROOT / "benchmarks" / f"{name}.json").read_text())
 
@@ -257,8 +288,13 @@ def curves_text() -> dict[str, str]:
         return {}
     runs = json.loads(file.read_text())
     of_sizes = {name: run for name, run in runs.items() if _is_of_sizes(name, run)}
-    others = {name: run for name, run in runs.items() if name not in of_sizes}
-    texts = {"curves": curves_table(others), "curves-panoramas": panoramas_table(of_sizes)}
+    of_models = {name: run for name, run in runs.items() if name == f"shape-{run.get('models')}"}
+    others = {k: run for k, run in runs.items() if k not in of_sizes and k not in of_models}
+    texts = {
+        "curves": curves_table(others),
+        "curves-panoramas": panoramas_table(of_sizes),
+        "curves-models": models_table(of_models),
+    }
     if "detector" in runs:
         texts["curve-detector"] = detector_curve(runs["detector"])
     return texts
@@ -298,6 +334,19 @@ def panoramas_table(runs: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def models_table(runs: dict[str, Any]) -> str:
+    """Return what the same training of shapes reaches with so many models."""
+    lines = [
+        "| models | steps | objects of validation panoramas | pictures of unseen models | mean |",
+        "| ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for run in sorted(runs.values(), key=lambda run: run["models"]):
+        best = max(run["points"], key=lambda point: point["selection"])
+        scores = [f"{best[name]:.3f}" for name in ("crops_iou", "unseen_iou", "selection")]
+        lines.append(f"| {run['models']} | {run['steps']} | {' | '.join(scores)} |")
+    return "\n".join(lines)
+
+
 def _is_of_sizes(name: str, run: dict[str, Any]) -> bool:
     """Return whether a training is one of several with different numbers of panoramas."""
     return name == f"{run['stage']}-{run['panoramas']}"
@@ -316,41 +365,6 @@ def detector_curve(run: dict[str, Any]) -> str:
         recall = " | ".join(f"{point[name]:.0%}" for name in ("bfov_recall", "bfov_recall_any"))
         lines.append(f"| {point['step']} | {precision} | {recall} |".replace("%", ""))
     return "\n".join(lines)
-
-
-def shape_text() -> dict[str, str]:
-    """Return how good predicted shapes are, over points, over meshes and by category."""
-    measured = json.loads((ROOT / "benchmarks" / "shape_scores.json").read_text())
-    metrics, scores = measured["metrics"], measured["scores"]
-    points = ["| kind | network | box |", "| --- | --- | --- |"]
-    for kind, words in SHAPE_KINDS.items():
-        points.append(
-            f"| {words} | {metrics[f'{kind}_iou']:.3f} | {metrics[f'{kind}_box_iou']:.3f} |"
-        )
-    meshes = ["| kind | objects | method | Chamfer | F-score | normals | IoU |", "| --- " * 7 + "|"]
-    for kind, found in scores.items():
-        for method, mean in found["mean"].items():
-            exact = " | ".join(
-                f"{mean[name]:.3f}" for name in ("f_score", "normal_consistency", "volume_iou")
-            )
-            meshes.append(
-                f"| {kind} | {found['objects']} | {method} | {mean['chamfer']:.2f} | {exact} |"
-            )
-    names = sorted({name for found in scores.values() for name in found["by_category"]})
-    rows = [f"| category | {' | '.join(scores)} |", "| --- " * (1 + len(scores)) + "|"]
-    for name in names:
-        cells = [_shape_cell(found["by_category"].get(name)) for found in scores.values()]
-        rows.append(f"| {name} | {' | '.join(cells)} |")
-    tables = {"points": points, "meshes": meshes, "categories": rows}
-    return {f"shape-{name}": "\n".join(lines) for name, lines in tables.items()}
-
-
-def _shape_cell(methods: dict[str, Any] | None) -> str:
-    if methods is None:
-        return ""
-    values = [found["volume_iou"] for found in methods.values()]
-    overlaps = " / ".join("-" if value is None else f"{value:.2f}" for value in values)
-    return f"{overlaps} ({methods['network']['objects']})"
 
 
 def upright_text() -> dict[str, str]:

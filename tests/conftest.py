@@ -21,6 +21,8 @@ from playwright.sync_api import Browser, expect, sync_playwright
 # pytest-xdist runs one worker on each core
 torch.set_num_threads(1)
 os.environ.setdefault("MPLBACKEND", "Agg")
+# no test asks the network for weights
+os.environ["HF_HUB_OFFLINE"] = "1"
 # collecting makes millions of objects that stay: looking through them takes a third of the time
 gc.disable()
 

@@ -1,12 +1,15 @@
 """The numbers in the documentation are those of the committed measurements."""
 
+import importlib
 import json
+import re
 import runpy
 import sys
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
+import torch
 
 
 def test_tables_are_up_to_date(
@@ -17,6 +20,18 @@ def test_tables_are_up_to_date(
     with pytest.raises(SystemExit) as end:
         runpy.run_path(program, run_name="__main__")
     assert end.value.code == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize("stage", ["detector", "layout", "pose", "shape", "context"])
+def test_networks_are_as_large_as_the_pages_say(root: Path, stage: str):
+    row = re.compile(r"\| parameters \| ([\d.]+) million \| ([\d.]+) million \|")
+    (told,) = row.findall((root / "docs" / f"{stage}.md").read_text())
+    module: Any = importlib.import_module(f"panoscene.models.{stage}")
+    for edition, text in zip(("paper", "compact"), told, strict=True):
+        with torch.device("meta"):
+            network = getattr(module, f"build_{stage}")(module.CONFIGS[edition])
+        millions = sum(parameter.numel() for parameter in network.parameters()) / 1e6
+        assert text == f"{millions:.{len(text.partition('.')[2])}f}"
 
 
 def test_measurements_are_json(root: Path):

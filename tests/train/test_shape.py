@@ -1,5 +1,6 @@
 """Training of the shape network."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,14 @@ from panoscene.models.shape import CONFIGS
 from panoscene.synth.assets import CadModel, Material, add_models
 from panoscene.train import TrainError, TrainRecipe, read_train_recipe
 from panoscene.train._shape import ShapeOptions, ShapeTask, shape_task
-from panoscene.train._shape_scores import METHODS, canonical, nearest_model, shape_scores
+from panoscene.train._shape_scores import (
+    METHODS,
+    _without_slabs,
+    canonical,
+    nearest_model,
+    shape_scores,
+)
+from panoscene.train._shape_tables import shape_tables
 
 for package in ("skimage", "fast_simplification"):
     pytest.importorskip(package, reason="an optional package")
@@ -113,26 +121,58 @@ def test_the_first_models_are_of_all_categories(
     assert fewer.seen == list(order[:-1])
 
 
+def test_the_number_of_views_may_change_in_a_folder(task: ShapeTask) -> None:
+    options = task.options.model_dump(mode="json") | {"frozen_views": 1}
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
+        data=SAMPLES, options=options,
+    )  # fmt: skip
+    other = shape_task(recipe)
+    assert isinstance(other, ShapeTask)
+    assert other.views is not None
+    assert task.views is not None
+    assert (other.views.features.shape[1], task.views.features.shape[1]) == (1, 2)
+
+
 @pytest.mark.train
-def test_overfits_two_models(task: ShapeTask) -> None:
+@pytest.mark.parametrize("frozen_views", [2, 0])
+def test_overfits_two_models(task: ShapeTask, frozen_views: int) -> None:
+    options = task.options.model_dump(mode="json") | {"frozen_views": frozen_views}
+    recipe = TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
+        data=SAMPLES, options=options,
+    )  # fmt: skip
+    with torch.random.fork_rng():
+        torch.manual_seed(0)  # noqa: TID251 (the network starts from it)
+        made = shape_task(recipe)
+    assert isinstance(made, ShapeTask)
+    task = made
+    start = {name: value.clone() for name, value in task.model.state_dict().items()}
     before = task.validate(task.model.eval(), None)
     with torch.random.fork_rng():
         torch.manual_seed(0)  # noqa: TID251 (the network starts from it)
-        head = [p for n, p in task.model.named_parameters() if task.rate(n) > 0]
-        optimiser = torch.optim.AdamW(head, 5e-3)
+        learnt = {n: p for n, p in task.model.named_parameters() if task.rate(n) > 0}
+        groups = [
+            {"params": [p], "lr": 5e-4 if n.startswith("encoder.backbone.") else 5e-3}
+            for n, p in learnt.items()
+        ]
+        optimiser = torch.optim.AdamW(groups)
         task.model.train()
-        for step in range(60):
+        for step in range(50):
             generator = torch.Generator().manual_seed(step)
             batch = task.collate([task.sample(k, generator) for k in range(task.sample_count())])
             loss = torch.stack(list(task.losses(task.model, batch).values())).sum()
             optimiser.zero_grad()
             loss.backward()
-            assert all(bool(p.grad.isfinite().all()) for p in head if p.grad is not None)
+            gradients = [p.grad for p in learnt.values() if p.grad is not None]
+            assert all(bool(gradient.isfinite().all()) for gradient in gradients)
             optimiser.step()
     task.model.eval()
     after = task.validate(task.model, None)
     name = "seen_iou" if "seen_iou" in after else "unseen_iou"
     assert after[name] > max(before[name], after[name.replace("iou", "box_iou")]) + 0.15
+    stem = "encoder.backbone.network.conv_stem.weight"
+    assert torch.equal(task.model.state_dict()[stem], start[stem]) == bool(frozen_views)
     assert set(task.pictures(task.model)) <= {"crops", "unseen", "seen"}
 
 
@@ -146,15 +186,59 @@ def test_the_truth_scores_one(task: ShapeTask) -> None:
 
 
 def test_scores_name_methods_and_categories(task: ShapeTask) -> None:
-    task.unseen = ["test/chair"]
+    task.seen, task.unseen = ["test/table"], ["test/chair"]
     task.model.eval()
     scores = shape_scores(task, points=200, resolution=32)
-    unseen = scores["unseen"]
-    assert isinstance(unseen, dict)
-    assert unseen["objects"] == 1
-    assert tuple(unseen["mean"]) == METHODS
+    unseen, seen = scores["unseen"], scores["seen"]
+    assert unseen["objects"] == seen["objects"] == 1
+    assert tuple(seen["mean"]) == METHODS
+    assert tuple(unseen["mean"]) == ("network", "retrieval", "box")
     assert list(unseen["by_category"]) == ["chair"]
+    # the library has no chair: a shape that is missed has no distance, and shares no volume
+    nothing = unseen["mean"]["retrieval"]
+    assert (nothing["missed"], nothing["chamfer"], nothing["volume_iou"]) == (1, None, 0.0)
+    assert seen["mean"]["retrieval"]["volume_iou"] == pytest.approx(1.0)
+    assert seen["mean"]["retrieval without the model"]["missed"] == 1
+    box = seen["mean"]["box"]
+    assert (box["missed"], box["volumes"], box["objects"]) == (0, 1, 1)
+    assert 0 < box["volume_iou"] < 1
+
+
+def test_retrieval_may_leave_out_a_model(task: ShapeTask) -> None:
     assert nearest_model(task, "sofa", torch.ones(3)) is None
+    task.seen = ["test/chair", "test/table"]
+    assert nearest_model(task, "chair", torch.ones(3)) is not None
+    assert nearest_model(task, "chair", torch.ones(3), but="test/table") is not None
+    assert nearest_model(task, "chair", torch.ones(3), but="test/chair") is None
+
+
+def test_what_gets_a_slab_is_not_scored(task: ShapeTask) -> None:
+    picture, shape = task.validation()["seen" if task.seen else "unseen"][0]
+    flat = replace(picture, size=torch.tensor([2.0, 1.0, 0.02]))
+    door = replace(shape, category="door")
+    kept = _without_slabs([(flat, shape), (picture, shape), (picture, door)])
+    assert [(one is picture, other is shape) for one, other in kept] == [(True, True)]
+    assert not _without_slabs([])
+
+
+def test_tables_tell_over_how_many_objects_means_are() -> None:
+    network = {"chamfer": 4.0, "f_score": 0.5, "normal_consistency": 0.75, "volume_iou": 0.5}
+    counts = {"objects": 3, "missed": 1, "volumes": 2}
+    box = network | {"chamfer": 5.0, "f_score": 0.75, "missed": 0, "volume_iou": None}
+    means = {"network": network | counts, "box": counts | box}
+    means["retrieval"] = means["box"] | {"missed": 3, "chamfer": None}
+    kind = {"objects": 3, "slabs_left_out": 7, "mean": means, "by_category": {"chair": means}}
+    metrics = {f"{name}_iou": 0.25 for name in ("crops", "unseen", "seen")}
+    metrics |= {f"{name}_box_iou": 0.125 for name in ("crops", "unseen", "seen")}
+    measured = {"scores": {"unseen": kind}, "metrics": metrics, "models": 9, "points": 1000}
+    tables = shape_tables(measured)
+    row = "| unseen | 3 | network | 4.00 (of 2) | 0.500 | 0.750 | 0.500 (of 2) |"
+    assert row in tables["shape-meshes"]
+    assert "| unseen | box | Chamfer | F-score, normals |" in tables["shape-better"]
+    row = "| chair | unseen | 3 | 4.0 / - / 5.0 | 0.50 / 0.75 / 0.75 | 0.75 / 0.75 / 0.75 |"
+    assert row in tables["shape-categories"]
+    assert "1,000 points" in tables["shape-how"]
+    assert "7 `unseen`" in tables["shape-how"]
 
 
 @pytest.mark.parametrize("edition", ["compact", "paper"])

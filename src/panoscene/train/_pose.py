@@ -79,7 +79,8 @@ class PoseTask(Task):
         found = {} if folder is None else read_stage_records(folder)
         self.scenes = read_pose_scenes(training_panoramas(data, recipe), found)
         self.validation = read_pose_scenes(open_dataset(data, "val")[:], found)
-        self.network = build_pose(self.network_config, imagenet=recipe.imagenet)
+        imagenet = recipe.imagenet and recipe.start is None
+        self.network = build_pose(self.network_config, imagenet=imagenet)
         self.model = self.network
         self.mean_size = mean_sizes([scene.scene for scene in self.scenes])
         self.network.mean_size.copy_(self.mean_size)

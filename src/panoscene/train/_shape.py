@@ -66,7 +66,8 @@ class ShapeOptions(BaseModel):
     assets: Path = Path("~/.cache/panoscene/assets")
     """Cache of the models, made by ``panoscene synth assets``."""
     prepare: bool = True
-    """Whether to make what is missing in the folder first: hours for a thousand models."""
+    """Whether to make what is missing in the folder first: half an hour for a thousand
+    models."""
     points: int = 1024
     """Uniform ones of each object, and as many near the surface."""
     renders: int = 1
@@ -154,7 +155,7 @@ class ShapeTask(Task):
         count, rows = self.options.frozen_views, self.network_config.crop
         keys = [f"{name} {crop} of {count}" for crop, name in self.entries]
         backbone = content_hash(self.model.encoder.backbone.state_dict())[:12]
-        file = self.options.folder / f"seen-{backbone}-{rows}.safetensors"
+        file = self.options.folder / f"seen-{backbone}-{rows}-{count}.safetensors"
         known = read_seen_views(file) if file.is_file() else None
         there = frozenset() if known is None else frozenset(known.names)
         missing = [k for k, key in enumerate(keys) if key not in there]

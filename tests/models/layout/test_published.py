@@ -1,5 +1,6 @@
 """Weights of HorizonNet as published: names, signs, and files that are not what they seem."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,11 @@ from panoscene.models.layout import (
     LayoutConfig,
     LayoutNetwork,
     build_layout,
+    load_layout_stage,
     read_published_layout,
 )
+from panoscene.train import TrainRecipe
+from panoscene.train._layout import layout_task
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +87,38 @@ def test_boundaries_point_upwards(
     assert torch.equal(network.head.weight[:4], published["linear.weight"][:4])
     assert torch.equal(network.head.weight[4:], -published["linear.weight"][4:])
     assert torch.equal(network.head.bias[4:], -published["linear.bias"][4:])
+
+
+def test_the_lines_in_the_documentation_make_a_file_of_weights(
+    published: dict[str, Tensor],
+    small_paper: LayoutConfig,
+    root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = (root / "docs" / "layout.md").read_text()
+    (lines,) = (
+        block for block in re.findall(r"```text\n(.*?)```", page, re.DOTALL) if ".pth" in block
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(CONFIGS, "paper", small_paper)
+    torch.save(published, "resnet50_rnn__st3d.pth")
+    exec(compile(lines, "layout.md", "exec"), {})  # noqa: S102
+    weights = tmp_path / "layout.safetensors"
+    bias = published["linear.bias"]
+    assert torch.equal(load_layout_stage("paper", weights).network.head.bias[:4], bias[:4])
+    recipe = TrainRecipe(
+        stage="layout",
+        edition="paper",
+        steps=1,
+        batch_size=1,
+        learning_rate=1e-3,
+        data=root / "samples" / "synth",
+        imagenet=True,  # "start" goes before: no file of them is asked for
+        start=weights,
+    )
+    started = layout_task(recipe).model.state_dict()
+    assert torch.equal(started["head.bias"][4:], -bias[4:])
 
 
 class Malicious:

@@ -153,7 +153,9 @@ def _lighter(
 
 
 def is_closed(faces: Int64[np.ndarray, "faces 3"]) -> bool:
-    """Return whether every edge is run along once in each direction.
+    """Return whether every edge is run along as often in one direction as in the other.
+
+    So every part is closed; parts may touch along an edge.
 
     Examples:
         >>> import numpy as np
