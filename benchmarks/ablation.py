@@ -12,6 +12,7 @@ from pathlib import Path
 
 from panoscene.models import read_weights_header
 from panoscene.scene import write_atomically
+from panoscene.synth.dataset import open_dataset
 
 FILE = Path(__file__).with_suffix(".json")
 SCORES = {
@@ -40,6 +41,7 @@ def main() -> None:
             "steps": int(header.metrics["step"]),
             "batch_size": header.recipe["batch_size"],
             "seed": header.seed,
+            "homes_version": open_dataset(Path(header.recipe["data"])).info.homes_version,
         } | {
             view + score: header.metrics[view + score]
             for view in ("", "found_")

@@ -198,8 +198,9 @@ def _without_features(rows: Mapping[str, Mapping]) -> list[str]:
     return [
         "## Without the proposed features", "",
         f"Trainings of boxes and relations from scratch, {one['steps']} steps of"
-        f" {one['batch_size']} scenes and seed {one['seed']} each: too short",
-        "to be the best, and one seed says little about small differences.", "",
+        f" {one['batch_size']} scenes and seed {one['seed']} each,",
+        f"on homes of version {one.get('homes_version', 1)}: too short to be the best, and one",
+        "seed says little about small differences.", "",
         ablation.table(dict(rows)), "",
     ]  # fmt: skip
 
