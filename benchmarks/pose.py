@@ -184,8 +184,7 @@ def card(result: Mapping, weights: Path) -> str:
 LIMITS = (
     "## Limits",
     "",
-    "- Crops add little: most of what sizes and yaws come from are the BFoVs, the categories and the",
-    "  room.",
+    "- Crops add little: sizes and yaws come from BFoVs, categories and the room above all.",
     "- Front for back is taken no less often than by the baseline, for which all objects face the",
     "  camera.",
     "- Thin things (pictures, carpets, clocks, mirrors) rarely reach an IoU of 0.15.",

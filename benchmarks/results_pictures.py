@@ -36,6 +36,8 @@ ROW = "full"
 TEN, WORST = 10, 5
 SPLITS = ("test-seen", "test-unseen")
 HEIGHT, SHEET_HEIGHT = 300, 850
+FORGIVEN = 0.1
+"""Metres of overlap that are not marked, as `panoscene reconstruct` does."""
 LARGEST = 250_000
 """Bytes that one committed file may have."""
 
@@ -114,10 +116,13 @@ def picture(item: PanoramaItem, found: Scene) -> Image.Image:
         parts = []
         for k, scene in enumerate((found, truth)):
             file = Path(folder) / f"{k}.png"
-            draw_overlay(scene, file, image=image, labels=k == 0)
+            draw_overlay(scene, file, image=image, labels=k == 0, tolerance=FORGIVEN)
             parts.append(opened(file))
         file = Path(folder) / "above.png"
-        draw_birds_eye(found, file, reference=truth, relations=False, title=item.name, caption="")
+        draw_birds_eye(
+            found, file, reference=truth, relations=False, title=item.name, caption="",
+            tolerance=FORGIVEN,
+        )  # fmt: skip
         parts.append(opened(file))
     row = Image.new("RGB", (sum(part.width for part in parts), HEIGHT), "white")
     left = 0
@@ -139,7 +144,7 @@ def every_side(item: PanoramaItem, found: Scene) -> Image.Image:
             rendering=render_panorama(found),
             view=render_view(found, default_view(found)),
         )
-        draw_sheet([row], file, labels=True)
+        draw_sheet([row], file, labels=True, tolerance=FORGIVEN)
         return opened(file, SHEET_HEIGHT)
 
 

@@ -14,7 +14,7 @@ from panoscene.views._far import draw_arrow_head, far_objects, place_pointers
 from panoscene.views._page import Page
 from panoscene.views._panels import fit_rooms
 from panoscene.views._pictures import fitted_pixels
-from panoscene.views._pieces import View, make_plan
+from panoscene.views._pieces import TOLERANCE, View, make_plan
 
 _FINER = 2
 """Times as large as they are shown rooms are drawn, so that their lines are as fine as the room."""
@@ -29,6 +29,7 @@ def room_cell(
     height: int,
     *,
     reference: Scene | None = None,
+    tolerance: float = TOLERANCE,
 ) -> UInt8[np.ndarray, "{height} {width} 3"]:
     """Return a room from above without text; rooms of one group at one scale, turn and place.
 
@@ -38,6 +39,7 @@ def room_cell(
         width: of the cell in pixels.
         height: of the cell in pixels.
         reference: a scene whose boxes are outlined.
+        tolerance: metres of overlap from which boxes collide.
     """
     page = Page(_FINER * width, _FINER * height)
     free = page.width - 2 * _AROUND, page.height - 2 * _AROUND
@@ -45,7 +47,7 @@ def room_cell(
     x, y = scale * (right - left) / 2, scale * (high - low) / 2
     offset = page.width / 2 - x - scale * left, page.height / 2 - y - scale * low
     view = View(turn, scale, offset)
-    plan = make_plan(scene, view, relations=False)
+    plan = make_plan(scene, view, relations=False, tolerance=tolerance)
     content = page.width / 2 - x, page.height / 2 - y, page.width / 2 + x, page.height / 2 + y
     page.clip((content[0] - 4, content[1] - 4, content[2] + 4, content[3] + 4))
     draw_room(page, plan, reference, view)

@@ -27,6 +27,7 @@ from panoscene.views._drawing import draw_alarm
 from panoscene.views._overlay import overlay_page
 from panoscene.views._page import Page
 from panoscene.views._panels import LARGEST
+from panoscene.views._pieces import TOLERANCE
 from panoscene.views._sheet_grid import (
     HEADING_ROW,
     HEADINGS,
@@ -55,6 +56,7 @@ def draw_sheet(
     reference: Scene | None = None,
     labels: bool = False,
     width_px: int = USUAL_WIDTH,
+    tolerance: float = TOLERANCE,
 ) -> None:
     """Write a PNG that compares scenes: a row for each, with input, above, overlay, render, view.
 
@@ -69,6 +71,7 @@ def draw_sheet(
         reference: a scene whose boxes are outlined from above, such as the truth.
         labels: whether to write names on the overlays.
         width_px: width of the sheet; its height follows.
+        tolerance: metres of overlap from which boxes collide.
 
     Source: paper, Sec. 4, the qualitative comparisons.
 
@@ -84,7 +87,8 @@ def draw_sheet(
     _write_title(page, grid, title)
     for first, group in rooms_of(rows):
         _draw_room_heading(page, grid, group[0].room, grid.tops[first])
-        _draw_group(page, grid, group, grid.tops[first:], reference, labels=labels)
+        tops = grid.tops[first:]
+        _draw_group(page, grid, group, tops, reference, labels=labels, tolerance=tolerance)
     _draw_key(page, grid, rows, with_reference=reference is not None)
     page.save(path)
 
@@ -129,6 +133,7 @@ def _draw_group(
     reference: Scene | None,
     *,
     labels: bool,
+    tolerance: float,
 ) -> None:
     """Draw the rows of one room."""
     photo = next((row.image for row in group if row.image is not None), None)
@@ -146,11 +151,14 @@ def _draw_group(
                 _lay(page, grid, column, framed(picture, cell.width, cell.height), top)
         if row.scene is not None:
             cell = grid.cells["room"]
-            above = room_cell(row.scene, scenes, cell.width, cell.height, reference=reference)
+            above = room_cell(
+                row.scene, scenes, cell.width, cell.height,
+                reference=reference, tolerance=tolerance,
+            )  # fmt: skip
             _lay(page, grid, "room", above, top)
             wide = grid.cells["overlay"].width
-            overlay = overlay_page(row.scene, wide, image=image, labels=labels).pixels()
-            _lay(page, grid, "overlay", overlay, top)
+            overlay = overlay_page(row.scene, wide, image=image, labels=labels, tolerance=tolerance)
+            _lay(page, grid, "overlay", overlay.pixels(), top)
 
 
 def _lay(
