@@ -48,7 +48,7 @@ def ray_cluster(ray: ModuleType, address: str | None) -> Iterator[None]:
         try:
             _knock(address)
             ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
-        except (ConnectionError, OSError, ValueError) as error:
+        except OSError as error:
             raise ConnectionError(f"{address}: found no Ray cluster there") from error
     try:
         yield
@@ -61,10 +61,11 @@ def _knock(address: str | None) -> None:
     """Try whether anybody answers at an address, as the package would wait for minutes.
 
     Raises:
-        OSError: Nobody does.
-        ValueError: The port is no number.
+        OSError: Nobody does, or it is no address.
     """
     host, colon, port = (address or "").removeprefix("ray://").rpartition(":")
+    if colon and not port.isdecimal():
+        raise ConnectionError(f"found port {port}, expected a number")
     if colon:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE).close()
 

@@ -339,7 +339,7 @@ def test_the_page_says_where_relations_are_better_than_the_rule_and_where_not() 
     assert "not in wall (86.6 to 87.6, difference -1.0 [-2.0, 0.4])." in results_page([full, rule])
     unsure = {"relations.on_floor_f1": Measured(value=0.05, low=-0.01, high=0.11)}
     full = full.model_copy(update={"differences": {"pose": unsure | difference}})
-    words = "`full` is ahead by no more than chance may bring in floor (5.0 [-1.0, 11.0])"
+    words = "`full` is ahead by no more than chance may bring: floor (5.0 [-1.0, 11.0])"
     assert words in results_page([full, rule])
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,6 +72,13 @@ def fixture_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def recipe_with(options: dict[str, Any]) -> TrainRecipe:
+    return TrainRecipe(
+        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
+        data=SAMPLES, options=options,
+    )  # fmt: skip
+
+
 @pytest.fixture(name="task")
 def fixture_task(folder: Path, monkeypatch: pytest.MonkeyPatch) -> ShapeTask:
     monkeypatch.setattr("panoscene.train._shape.CONFIGS", {"compact": TINY})
@@ -82,10 +90,7 @@ def fixture_task(folder: Path, monkeypatch: pytest.MonkeyPatch) -> ShapeTask:
         "frozen_views": 2,
         "near_weight": 0.3,
     }
-    recipe = TrainRecipe(
-        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
-        data=SAMPLES, options=options,
-    )  # fmt: skip
+    recipe = recipe_with(options)
     with torch.random.fork_rng():
         torch.manual_seed(0)  # noqa: TID251 (the network starts from it)
         task = shape_task(recipe)
@@ -111,10 +116,7 @@ def test_the_first_models_are_of_all_categories(
     order = tuple(reversed(task.seen))
     monkeypatch.setattr("panoscene.train._shape.shaped_models", lambda assets: ("other", *order))
     options = task.options.model_dump(mode="json") | {"models": len(order) - 1}
-    recipe = TrainRecipe(
-        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
-        data=SAMPLES, options=options,
-    )  # fmt: skip
+    recipe = recipe_with(options)
     fewer = shape_task(recipe)
     assert isinstance(fewer, ShapeTask)
     assert len(order) > 1
@@ -123,10 +125,7 @@ def test_the_first_models_are_of_all_categories(
 
 def test_the_number_of_views_may_change_in_a_folder(task: ShapeTask) -> None:
     options = task.options.model_dump(mode="json") | {"frozen_views": 1}
-    recipe = TrainRecipe(
-        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
-        data=SAMPLES, options=options,
-    )  # fmt: skip
+    recipe = recipe_with(options)
     other = shape_task(recipe)
     assert isinstance(other, ShapeTask)
     assert other.views is not None
@@ -138,10 +137,7 @@ def test_the_number_of_views_may_change_in_a_folder(task: ShapeTask) -> None:
 @pytest.mark.parametrize("frozen_views", [2, 0])
 def test_overfits_two_models(task: ShapeTask, frozen_views: int) -> None:
     options = task.options.model_dump(mode="json") | {"frozen_views": frozen_views}
-    recipe = TrainRecipe(
-        stage="shape", edition="compact", steps=1, batch_size=2, learning_rate=1e-3,
-        data=SAMPLES, options=options,
-    )  # fmt: skip
+    recipe = recipe_with(options)
     with torch.random.fork_rng():
         torch.manual_seed(0)  # noqa: TID251 (the network starts from it)
         made = shape_task(recipe)

@@ -87,7 +87,7 @@ def _against_rule(scores: Sequence[ScoreFile], columns: Sequence[Column]) -> str
         sure = [_relation(column) for column, *_, both in ahead if not _chance(both)]
         narrow = [_gained(column, both) for column, *_, both in ahead if both and _chance(both)]
         words = [f"ahead in {listed(sure)}"] if sure else []
-        words += [f"ahead by no more than chance may bring in {listed(narrow)}"] if narrow else []
+        words += [f"ahead by no more than chance may bring: {listed(narrow)}"] if narrow else []
         words += [f"not in {listed([_lost(*found) for found in behind])}"] if behind else []
         verdicts.append(f"`{name}` is " + ", ".join(words))
     if not verdicts:
