@@ -101,6 +101,15 @@ def test_flags_are_for_programs_and_people(truth: Scene, photo: Tensor) -> None:
     assert SphereGaps(0.0, 0.0, 0.0, 0.2).where == ""
 
 
+def test_small_photos_are_told(truth: Scene, photo: Tensor) -> None:
+    pipeline = Pipeline(Knowing(truth).stages(shape=None))
+    [flag] = pipeline(photo[:, ::4, ::4]).flags
+    assert flag.code == "low_resolution"
+    assert flag.numbers == {"columns": COLUMNS // 4}
+    assert flag.text == f"the photo is small: found {COLUMNS // 4} columns, expected 512 or more"
+    assert pipeline(photo).flags == ()
+
+
 def meadow() -> Tensor:
     """A plain sky over rough ground, as far as one can see."""
     generator = torch.Generator().manual_seed(0)

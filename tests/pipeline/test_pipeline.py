@@ -40,7 +40,7 @@ def test_ground_truth_through_every_stage_is_the_truth(truth: Scene, image: Tens
     assert knowing.asked == ["detector", "layout", "pose", "shape"]
     assert list(result.timings) == ["upright", "detector", "layout", "pose", "arrangement", "shape"]
     assert knowing.sizes == [(3, 512, 1024)]
-    assert result.doubts == ()
+    assert [flag.code for flag in result.flags] == ["low_resolution"]
     assert result.certificate is not None
 
 
@@ -78,7 +78,8 @@ def test_a_room_without_objects_is_a_scene_with_a_doubt(truth: Scene, image: Ten
     empty = replace(truth, objects=select_objects(truth.objects, torch.zeros(0, dtype=torch.long)))
     result = Pipeline(Knowing(empty).stages())(image, truth.panorama)
     assert len(result.scene.objects.boxes) == 0
-    assert result.doubts == ("no object was found",)
+    assert result.doubts[-1] == "no object was found"
+    assert [flag.code for flag in result.flags] == ["low_resolution", "nothing_found"]
 
 
 def test_doubts_are_told(truth: Scene, image: Tensor) -> None:

@@ -217,7 +217,8 @@ def shape_sample(
         generator: Of the augmentation.
         rows: Of the crop, and columns.
         points: Uniform ones, and as many near the surface.
-        frame: The network's.
+        frame: The network's. One that works in the box learns from points in the box only: what
+            it says elsewhere is cut off.
         view: The crop, when it was made before; else it is made now.
     """
     if view is None:
@@ -231,8 +232,11 @@ def shape_sample(
             yaw = math.pi * 2 * float(torch.rand((), generator=generator))
     bfov = picture.bfov.clone()
     bfov[2:] = 2 * torch.atan(torch.tan(bfov[2:] / 2) * view.window)
-    near, near_outside = _points(shape.near, points, generator)
-    uniform, uniform_outside = _points(shape.uniform, points, generator)
+    near, uniform = shape.near, shape.uniform
+    if frame == "box":
+        near, uniform = (_in_box(stored, shape.extent) for stored in (near, uniform))
+    near, near_outside = _points(near, points, generator)
+    uniform, uniform_outside = _points(uniform, points, generator)
     grid = torch.from_numpy(shape.grid.astype(np.float32))
     stretch = torch.from_numpy(shape.extent)
     if frame == "longest":
@@ -316,6 +320,11 @@ def _recoloured(crop: Tensor, generator: torch.Generator) -> Tensor:
     noise = 0.02 * float(draw[5].abs())
     changed = (crop * gain).clamp(1e-3, 1) ** gamma
     return (changed + noise * torch.randn(crop.shape, generator=generator)).clamp(0, 1)
+
+
+def _in_box(stored: np.ndarray, extent: np.ndarray) -> np.ndarray:
+    """Return the stored points that lie in the box."""
+    return stored[(np.abs(stored[:, :3]) <= extent / 2).all(1)]
 
 
 def _points(

@@ -9,6 +9,8 @@ from panoscene.scene import Scene
 from ._records import Flag
 from ._sphere import SphereGaps
 
+LEAST_COLUMNS = 512
+"""Columns of a photo below which networks, which look at 1024, miss most of what there is."""
 TOLD_TILT = math.radians(3.0)
 """Radians; from here on the user is told that the camera leant."""
 LEAST_WALL_DEG = 45.0
@@ -21,14 +23,18 @@ WEAK_EMPTY_WALL = 0.45
 """The same where nothing was found in the room either."""
 
 
-def photo_flags(gaps: SphereGaps, tilt: float) -> tuple[Flag, ...]:
+def photo_flags(gaps: SphereGaps, tilt: float, columns: int) -> tuple[Flag, ...]:
     """Return what is noteworthy about a photo.
 
     Args:
         gaps: what it lacks of the sphere.
         tilt: radians by which it was turned to stand upright.
+        columns: of the photo.
     """
     flags: list[Flag] = []
+    if columns < LEAST_COLUMNS:
+        text = f"the photo is small: found {columns} columns, expected {LEAST_COLUMNS} or more"
+        flags.append(Flag("low_resolution", text, {"columns": float(columns)}))
     if not gaps.whole:
         numbers = {
             "top_deg": math.degrees(gaps.top),

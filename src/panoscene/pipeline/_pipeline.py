@@ -123,7 +123,7 @@ class Pipeline:
         if given.objects is None and given.detections is None and given.relations is None:
             initial = without_doubles(initial)
         scene, certificate = self._arranged(initial, clock)
-        flags = photo_flags(gaps, tilt) + scene_flags(read, scene)
+        flags = photo_flags(gaps, tilt, image.shape[-1]) + scene_flags(read, scene)
         return Reconstruction(scene, initial, seen, certificate, read, clock.seconds, flags)
 
     def shape(self, placed: Reconstruction, *, resolution: int = 64) -> Reconstruction:

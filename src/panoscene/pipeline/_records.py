@@ -29,7 +29,14 @@ class Given:
     """Rotation that makes the photo upright; no tilt is looked for."""
 
 
-FlagCode = Literal["not_full_sphere", "tilted", "ambiguous_layout", "not_indoors", "nothing_found"]
+FlagCode = Literal[
+    "low_resolution",
+    "not_full_sphere",
+    "tilted",
+    "ambiguous_layout",
+    "not_indoors",
+    "nothing_found",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +44,8 @@ class Flag:
     """Something that a user should know before using a result."""
 
     code: FlagCode
-    """For programs. ``not_full_sphere``: a part of the sphere is plain, blurred or stretched.
+    """For programs. ``low_resolution``: the photo is small. ``not_full_sphere``: a part of the
+    sphere is plain, blurred or stretched.
     ``tilted``: the camera was, and the photo was turned. ``ambiguous_layout``: the room can be read
     in two ways. ``not_indoors``: the walls are uncertain. ``nothing_found``: no object."""
     text: str

@@ -268,11 +268,13 @@ class ShapeTask(Task):
         for index, (_, shape) in enumerate(chosen):
             stored = torch.from_numpy(shape.uniform[:_CHECK_POINTS].astype(np.float32))
             canonical = stored[:, :3] / torch.from_numpy(shape.extent)
-            points = canonical if self.network_config.frame == "box" else stored[:, :3]
-            value = field(index, points)
-            truth = stored[:, 3] < 0
-            found.append(_iou(value < ISO_LEVEL, truth))
-            box.append(_iou((canonical.abs() <= 0.5).all(-1), truth))
+            truth, in_box = stored[:, 3] < 0, (canonical.abs() <= 0.5).all(-1)
+            if self.network_config.frame == "box":
+                inside = (field(index, canonical) < ISO_LEVEL) & in_box
+            else:
+                inside = field(index, stored[:, :3]) < ISO_LEVEL
+            found.append(_iou(inside, truth))
+            box.append(_iou(in_box, truth))
         return float(np.mean(found)), float(np.mean(box))
 
     @torch.inference_mode()

@@ -100,6 +100,27 @@ def test_the_surface_is_where_the_field_says(fitting: ShapeNetwork) -> None:
         assert first.volume == pytest.approx(second.volume, rel=0.02)
 
 
+@pytest.mark.parametrize("resolution", [32, 64, 128])
+@pytest.mark.parametrize("most", [None, 600])
+def test_the_box_cuts_off_what_reaches_beyond(
+    network: ShapeNetwork, resolution: int, most: int | None
+) -> None:
+    # so loud that it fills the box and more
+    code = ball_code(TINY, (0.1, 0.0, 0.0), 1e12)
+    code[0, 4 - TINY.width : 7 - TINY.width] = 5.0
+    network = without_detail(network)
+    (mesh,) = extract_meshes(network, code, resolution=resolution, most=most)
+    found = as_trimesh(mesh)
+    assert found.is_watertight
+    assert found.bounds == pytest.approx(torch.tensor([[-0.5] * 3, [0.5] * 3]).numpy())
+    assert found.volume == pytest.approx(1, abs=0.5 / resolution)  # edges are cut by a cell
+    # nothing that is beyond the box comes back as a skin on its sides
+    code = ball_code(TINY, (0.9, 0.0, 0.0))
+    field = network.field(network.elements(code), torch.tensor([[[0.9, 0.0, 0.0]]]))
+    assert field.item() == pytest.approx(-1)
+    assert extract_meshes(network, code, resolution=resolution, most=most) == (None,)
+
+
 def test_shapes_come_in_order_and_empty_ones_are_none(fitting: ShapeNetwork) -> None:
     empty = torch.zeros(1, TINY.code)
     codes = torch.cat((empty, ball_code(TINY, (0.0, 0.0, 0.0)), empty))

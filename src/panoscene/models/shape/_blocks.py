@@ -113,16 +113,15 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
     guess = values @ tables.between
     grid.values.index_copy_(0, grid.index.flatten(), guess.flatten())
     found = _exact(grid, rough, tables, evaluate)
+    index = _flat(2 * place, tables.around, len(blocks.sides))
+    side = at(blocks.sides, index).to(values) @ tables.touching
+    found = torch.where(side > 0, found.clamp(min=_LEAST), found)
+    found = torch.where(side < 0, found.clamp(max=-_LEAST), found)
     error = known
     if not last:
         away = _columns((found - guess).abs_(), tables.parts).amax(1).t()
         error = torch.where(rough, away / GAIN, known)
     error = error.index_select(1, tables.eighth)
-
-    index = _flat(2 * place, tables.around, len(blocks.sides))
-    side = at(blocks.sides, index).to(values) @ tables.touching
-    found = torch.where(side > 0, found.clamp(min=_LEAST), found)
-    found = torch.where(side < 0, found.clamp(max=-_LEAST), found)
     cases = cell_cases(found < 0)
     sides = blocks.sides
     if not last:

@@ -60,8 +60,11 @@ class ShapeConfig(BaseModel):
 
     @property
     def reach(self) -> float:
-        """Return how far from the centre, along each axis, the surface is looked for."""
-        return 0.7 if self.frame == "longest" else 0.6
+        """Return how far from the centre, along each axis, the surface is looked for.
+
+        What works in the box ends where the box does: its sides cut the solid off.
+        """
+        return 0.7 if self.frame == "longest" else 0.5
 
 
 CONFIGS: dict[Edition, ShapeConfig] = {

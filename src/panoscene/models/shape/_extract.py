@@ -27,7 +27,9 @@ _MARGIN = 0.5
 _LEVELS = (ISO_LEVEL, -0.055, -0.04, -0.025)
 _FILLED = 0.85
 _CRUMB = 0.01
-_OUTSIDE = 0.01
+_OUTSIDE = 1e-4
+"""Value of nodes on the border of the grid, at least: surfaces that reach it end there."""
+_INNER = (slice(1, -1),) * 3
 _DECIMALS = 4
 """Of vertices: a tenth of a millimetre for each metre, and files of half the size."""
 
@@ -142,7 +144,8 @@ def _surface(shape: _Shape, config: ShapeConfig, resolution: int, most: int | No
         grid = shape.near(guess, _LEVELS)
         level, fitted, values = _level(grid.values, config)
     error = grid.error
-    moved = values != grid.values - level
+    moved = torch.zeros_like(values, dtype=torch.bool)
+    moved[_INNER] = (values != grid.values - level)[_INNER]
     if bool(moved.any()):
         error = torch.where(_each_twice(_most_of(moved.to(values))) > 0, torch.inf, error)
     blocks = first_blocks(values, error)
