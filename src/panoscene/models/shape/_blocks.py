@@ -51,6 +51,8 @@ class _Tables:
     """The part that each cell comes of."""
     corners: Int64[Tensor, "8 8"]
     """Nodes, of the 27, of each of the eight cells of a part."""
+    thirds: Int64[Tensor, "27 3"]
+    """Places of the nodes of a part."""
     steps: Int64[Tensor, "8 3"]
     nodes: Int64[Tensor, "125 3"]
     own: Int64[Tensor, " 64"]
@@ -106,7 +108,10 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
     place = 2 * blocks.place.index_select(0, block) + tables.steps.index_select(0, part)
     corners = _columns(values, tables.corners)
     least, most = corners.amin(1).t(), corners.amax(1).t()
-    rough = (least < 0) & (most >= 0) & (known > TOLERANCE * (most - least))
+    # where only the border is outside, it is the surface: no value is needed
+    own = values.masked_fill(_on_border(blocks, place, tables), -torch.inf)
+    crossed = _columns(own, tables.corners).amax(1).t() >= 0
+    rough = (least < 0) & crossed & (known > TOLERANCE * (most - least))
 
     nodes = 2 * (len(blocks.sides) - 2) + 1
     grid = _Sparse(values.new_zeros(nodes**3), _flat(CELLS * place, tables.nodes, nodes))
@@ -153,6 +158,15 @@ def _exact(
     place = at(own, numbers_of(at(wanted, own)))
     grid.values.index_copy_(0, place, evaluate(place))
     return at(grid.values, grid.index)
+
+
+def _on_border(
+    blocks: Blocks, place: Int64[Tensor, "new 3"], tables: _Tables
+) -> Bool[Tensor, "new 27"]:
+    """Return which nodes of the coarser grid, of those that finer blocks come of, are outermost."""
+    last = len(blocks.sides) - 2
+    ticks = 2 * place[:, None] + tables.thirds
+    return ((ticks == 0) | (ticks == last)).any(2)
 
 
 def _columns(
@@ -203,6 +217,7 @@ def _tables(device: torch.device) -> _Tables:
         cells=_flat(2 * halves, halves, CELLS),
         eighth=_flat(torch.zeros(1, 3, dtype=torch.int64), places(CELLS) // 2, 2)[0],
         corners=_flat(halves, halves, 3),
+        thirds=places(3),
         steps=halves,
         nodes=nodes,
         own=_flat(torch.zeros(1, 3, dtype=torch.int64), places(CELLS), _NODES)[0],

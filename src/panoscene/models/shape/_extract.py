@@ -128,6 +128,7 @@ class _Shape:
         nodes = len(guess)
         wanted = _nodes_of(cells, nodes)
         wanted[::2, ::2, ::2] = False
+        wanted = _inner(wanted)
         order = _by_place(nodes, guess.device)
         place = at(order, numbers_of(at(wanted, order)))
         finer = guess.flatten().index_copy(0, place, self.on(nodes - 1, place)).view_as(guess)
@@ -144,8 +145,7 @@ def _surface(shape: _Shape, config: ShapeConfig, resolution: int, most: int | No
         grid = shape.near(guess, _LEVELS)
         level, fitted, values = _level(grid.values, config)
     error = grid.error
-    moved = torch.zeros_like(values, dtype=torch.bool)
-    moved[_INNER] = (values != grid.values - level)[_INNER]
+    moved = _inner(values != grid.values - level)
     if bool(moved.any()):
         error = torch.where(_each_twice(_most_of(moved.to(values))) > 0, torch.inf, error)
     blocks = first_blocks(values, error)
@@ -247,6 +247,13 @@ def _level(
         if kept is None or share > most + step:
             best, most, kept = level, share, solid
     return best, False, values if kept is None else kept
+
+
+def _inner(nodes: Bool[Tensor, "n n n"]) -> Bool[Tensor, "n n n"]:
+    """Return nodes without those on the border, which are outside whatever the field says."""
+    found = torch.zeros_like(nodes)
+    found[_INNER] = nodes[_INNER]
+    return found
 
 
 def _close(values: Float[Tensor, "n n n"]) -> None:
