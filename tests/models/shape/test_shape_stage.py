@@ -121,6 +121,28 @@ def test_the_box_cuts_off_what_reaches_beyond(
     assert extract_meshes(network, code, resolution=resolution, most=most) == (None,)
 
 
+@pytest.mark.parametrize("resolution", [32, 64, 128])
+def test_thin_boards_on_a_side_stay(network: ShapeNetwork, resolution: int) -> None:
+    code = torch.zeros(1, TINY.elements, TINY.width)
+    # two boards, 1.4 percent thick, at the floor and the top, and a post between them
+    for k, height in enumerate((-0.5, 0.5)):
+        code[0, 31 - k, :7] = torch.tensor([0.5, 0.0, 0.0, 2 * height, 6.0, 6.0, -3.0])
+    code[0, 29, :7] = torch.tensor([1e3, 0.0, 0.0, 0.0, -1.6, -1.6, 6.0])
+    network = without_detail(network)
+    elements = network.elements(code.flatten(1))
+    heights = torch.tensor([-0.5, -0.49, -0.47, 0.47, 0.49, 0.5])
+    points = torch.stack((torch.full((6,), 0.15), torch.zeros(6), heights), 1)
+    inside = network.field(elements, points[None])[0] < -0.07
+    assert inside.tolist() == [True, True, False, False, True, True]
+    (mesh,) = extract_meshes(network, code.flatten(1), resolution=resolution)
+    found = as_trimesh(mesh)
+    assert found.is_watertight
+    assert found.bounds[:, 2] == pytest.approx([-0.5, 0.5])
+    for side in (-0.5, 0.5):
+        board = found.vertices[abs(found.vertices[:, 2] - side) < 0.04]
+        assert board[:, 0].max() - board[:, 0].min() == pytest.approx(0.67, abs=0.03)
+
+
 def test_shapes_come_in_order_and_empty_ones_are_none(fitting: ShapeNetwork) -> None:
     empty = torch.zeros(1, TINY.code)
     codes = torch.cat((empty, ball_code(TINY, (0.0, 0.0, 0.0)), empty))

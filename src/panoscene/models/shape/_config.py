@@ -14,6 +14,9 @@ HINTS = 8
 ISO_LEVEL = -0.07
 """Value of the field on the surface; it is lower inside."""
 
+_SIDE = 0.5
+"""Of the canonical box, from its centre."""
+
 Positive = Annotated[int, Field(ge=1)]
 
 
@@ -62,9 +65,15 @@ class ShapeConfig(BaseModel):
     def reach(self) -> float:
         """Return how far from the centre, along each axis, the surface is looked for.
 
-        What works in the box ends where the box does: its sides cut the solid off.
+        What works in the box is cut off by its sides, which are a 16th within the border of the
+        grid: so a thin board that lies on a side has nodes, too.
         """
-        return 0.7 if self.frame == "longest" else 0.5
+        return 0.7 if self.frame == "longest" else _SIDE * 17 / 16
+
+    @property
+    def seen(self) -> float:
+        """Return how far the field itself counts; beyond it is as at the nearest point."""
+        return self.reach if self.frame == "longest" else _SIDE
 
 
 CONFIGS: dict[Edition, ShapeConfig] = {

@@ -57,8 +57,9 @@ def extract_meshes(
         network: In evaluation mode.
         code: Of the shapes.
         resolution: Cells along each axis: 32, 64, 128 or 256.
-        most: Triangles that a mesh may have. Where it is flat cells have vertices in common, then
-            edges are collapsed; vertices have four decimals. None keeps all.
+        most: Triangles that a mesh should have at most; some keep more. Where it is flat cells
+            have vertices in common, then edges are collapsed; vertices have four decimals. None
+            keeps all.
 
     Returns:
         Closed meshes, faces counter-clockwise from outside; None where nothing is inside.
@@ -74,7 +75,7 @@ def extract_meshes(
 
     @torch.inference_mode()
     def surface(index: int) -> Mesh | None:
-        return _surface(_Shape(field, index, config.reach), config, resolution, most)
+        return _surface(_Shape(field, index, config), config, resolution, most)
 
     with alone() as threads:
         field = fast_field(network, network.elements(code))
@@ -98,11 +99,13 @@ class _Shape:
 
     field: FastField
     index: int
-    reach: float
+    config: ShapeConfig
 
     def axis(self, nodes: int) -> Float[Tensor, " nodes"]:
-        like = self.field.polynomial
-        return torch.linspace(-self.reach, self.reach, nodes, dtype=like.dtype, device=like.device)
+        """Return where the field is evaluated for the nodes along an axis."""
+        like, reach, seen = self.field.polynomial, self.config.reach, self.config.seen
+        places = torch.linspace(-reach, reach, nodes, dtype=like.dtype, device=like.device)
+        return places.clamp(-seen, seen)
 
     def everywhere(self) -> Float[Tensor, "m m m"]:
         """Return the field on 32 cells along each axis, on parabolas through those of 16."""
@@ -161,6 +164,7 @@ def _surface(shape: _Shape, config: ShapeConfig, resolution: int, most: int | No
         blocks = finer_blocks(blocks, exact, last=cells == resolution)
     mesh = _mesh(blocks, cells // CELLS, most)
     vertices = mesh.vertices * (2 * config.reach / cells) - config.reach
+    vertices = vertices.clamp(-config.seen, config.seen)
     if fitted:
         first, last = vertices.amin(0), vertices.amax(0)
         vertices = (vertices - (first + last) / 2) / (last - first)
