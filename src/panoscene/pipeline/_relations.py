@@ -50,8 +50,8 @@ def final_relations(scene: Scene, said: Relations | None) -> Relations:
     A contact that the boxes have holds, 1, unless a network finds it unlikely: below 0.4. One that
     they miss by at most 0.3 m, about the error of an estimate, holds where a network finds it
     likely, above 0.5, and is as probable as the network says. So no contact is told of what is
-    apart. The rule was chosen on homes of the training and the validation part; there it is better
-    than either of the two alone, and than the boxes of the pose network.
+    apart. The rule was chosen on homes of the training and the validation part, with the pose
+    network before today's; there it was better than either of the two alone.
 
     Args:
         scene: after the arrangement.

@@ -65,8 +65,8 @@ class ShapeConfig(BaseModel):
     def reach(self) -> float:
         """Return how far from the centre, along each axis, the surface is looked for.
 
-        What works in the box is cut off by its sides, which are a 16th within the border of the
-        grid: so a thin board that lies on a side has nodes, too.
+        What works in the box is cut off by its sides, a 32nd of the box within the border of
+        the grid: so a thin board that lies on a side has nodes, too.
         """
         return 0.7 if self.frame == "longest" else _SIDE * 17 / 16
 
