@@ -93,3 +93,54 @@ def test_what_only_fine_nodes_see_stays_closed() -> None:
         blocks = finer_blocks(blocks, lambda number: noise.flatten()[number % noise.numel()])
     _, faces = march(blocks.values, blocks.cases, blocks.place, 16)
     assert is_closed(faces.numpy())
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("upper", [True, False])
+def test_parabolas_do_up_to_the_rim(axis: int, upper: bool) -> None:
+    # a board on one side, its inner face in the last cell before the rim
+    place = torch.linspace(-1, 1, 33)
+    along = place if upper else place.flip(0)
+    board = (0.9 - along) + 0.3 * (along - 0.9) ** 2
+    values = board.view([-1 if k == axis else 1 for k in range(3)]).expand(33, 33, 33)
+
+    def never(number: Int64[Tensor, " n"]) -> Tensor:
+        assert len(number) == 0
+        return number.float()
+
+    blocks = first_blocks(closed(values), torch.zeros(32, 32, 32), rim=True)
+    for _ in range(2):
+        blocks = finer_blocks(blocks, never)
+    assert blocks.rim == 4
+    vertices, faces = march(blocks.values, blocks.cases, blocks.place, 32)
+    assert is_closed(faces.numpy())
+    height = vertices[:, axis] if upper else 128 - vertices[:, axis]
+    across = torch.cat((vertices[:, :axis], vertices[:, axis + 1 :]), 1)
+    height = height[((across > 16) & (across < 112)).all(1)]
+    inner = height[height < 123]
+    assert inner.tolist() == pytest.approx([0.95 * 128] * 95**2, abs=0.01)
+    assert (height[height > 123] - 125).abs().max() < 0.01
+
+
+def test_in_the_rim_nothing_is_asked_for() -> None:
+    generator = torch.Generator().manual_seed(7)
+    coarse = closed(torch.randn(17, 17, 17, generator=generator))
+    blocks = first_blocks(coarse, torch.full((16, 16, 16), torch.inf), rim=True)
+    asked = []
+
+    def evaluate(number: Int64[Tensor, " n"]) -> Tensor:
+        asked.append(number)
+        return torch.randn(len(number), generator=generator)
+
+    for cells, rim in ((32, 2), (64, 4)):
+        blocks = finer_blocks(blocks, evaluate)
+        nodes = cells + 1
+        number = asked[-1]
+        assert len(number) == len(number.unique()) > 1000
+        ticks = torch.stack((number // nodes**2, number // nodes % nodes, number % nodes))
+        assert ticks.min() == rim
+        assert ticks.max() == cells - rim
+    vertices, faces = march(blocks.values, blocks.cases, blocks.place, 16)
+    assert is_closed(faces.numpy())
+    assert vertices.min() > 3
+    assert vertices.max() < 61

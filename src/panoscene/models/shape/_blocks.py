@@ -37,6 +37,9 @@ class Blocks:
     place: Int64[Tensor, "blocks 3"]
     sides: Int8[Tensor, "n n n"]
     """Of each cell of the grid, and one more all around: -1 inside, 1 outside, 0 both."""
+    rim: int
+    """Cells along the border, if any, in which the field is as at their inner end. Their nodes but
+    those there are outside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +54,7 @@ class _Tables:
     """The part that each cell comes of."""
     corners: Int64[Tensor, "8 8"]
     """Nodes, of the 27, of each of the eight cells of a part."""
-    thirds: Int64[Tensor, "27 3"]
-    """Places of the nodes of a part."""
     steps: Int64[Tensor, "8 3"]
-    nodes: Int64[Tensor, "125 3"]
     own: Int64[Tensor, " 64"]
     """Nodes that are on no upper side: each node of a grid is one of them in one block."""
     between: Float[Tensor, "27 125"]
@@ -66,27 +66,51 @@ class _Tables:
     """Which nodes eight cells and those around them have, once divided."""
 
 
-def first_blocks(values: Float[Tensor, "n n n"], error: Float[Tensor, "c c c"]) -> Blocks:
+def first_blocks(
+    values: Float[Tensor, "n n n"], error: Float[Tensor, "c c c"], *, rim: bool = False
+) -> Blocks:
     """Return the blocks of a grid, of which all nodes on the border are outside.
 
     Args:
         values: On a multiple of four cells along each axis.
         error: In each cell, expected of parabolas.
+        rim: Whether the field beyond the nodes beside the border is as at those.
     """
     count = len(error) // CELLS
-    wide = values
+    cases = cell_cases(_in_blocks(values) < 0)
+    if rim:
+        # parabolas are to go on across the nodes beside the border
+        values = with_border(values, (3.0, -3.0, 1.0))
+    wide = _in_blocks(values)
     for axis in range(3):
-        wide = wide.unfold(axis, _NODES, CELLS)
         error = error.unfold(axis, CELLS, CELLS)
-    wide = wide.flatten(3).flatten(0, 2)
     ticks = torch.arange(count, device=values.device)
     place = torch.cartesian_prod(ticks, ticks, ticks)
-    cases = cell_cases(wide < 0)
     sides = values.new_ones((count * CELLS + 2,) * 3, dtype=torch.int8)
     _mark(sides, place, cases)
     some = numbers_of(mixed(cases).any(1))
     error = error.flatten(3).flatten(0, 2)
-    return Blocks(*(part.index_select(0, some) for part in (wide, cases, error, place)), sides)
+    parts = (part.index_select(0, some) for part in (wide, cases, error, place))
+    return Blocks(*parts, sides, int(rim))
+
+
+def with_border(
+    values: Float[Tensor, "n n n"], weights: tuple[float, ...], *, first: int = 1
+) -> Float[Tensor, "n n n"]:
+    """Return values with those on the border made of those within it, axis by axis.
+
+    Args:
+        values: At the nodes of a grid.
+        weights: Of nodes one behind the other, inwards.
+        first: The one that the first weight is for; 0 is on the border.
+    """
+    values = values.clone()
+    for axis in range(3):
+        for end, step in ((0, 1), (-1, -1)):
+            rows = [values.select(axis, end + step * (first + k)) for k in range(len(weights))]
+            made = torch.stack(rows, -1) @ values.new_tensor(weights)
+            values.select(axis, end).copy_(made)
+    return values
 
 
 def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> Blocks:
@@ -107,16 +131,19 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
     known = at(blocks.error, 64 * block[:, None] + tables.cells.index_select(0, part))
     place = 2 * blocks.place.index_select(0, block) + tables.steps.index_select(0, part)
     corners = _columns(values, tables.corners)
-    least, most = corners.amin(1).t(), corners.amax(1).t()
+    differ = (corners.amax(1) - corners.amin(1)).t()
     # where only the border is outside, it is the surface: no value is needed
-    own = values.masked_fill(_on_border(blocks, place, tables), -torch.inf)
-    crossed = _columns(own, tables.corners).amax(1).t() >= 0
-    rough = (least < 0) & crossed & (known > TOLERANCE * (most - least))
+    border = _outer(2 * place, 3, len(blocks.sides) - 2, max(blocks.rim, 1))
+    most = _columns(values.masked_fill(border, -torch.inf), tables.corners).amax(1).t()
+    least = _columns(values.masked_fill(border, torch.inf), tables.corners).amin(1).t()
+    rough = (least < 0) & (most >= 0) & (known > TOLERANCE * differ)
 
-    nodes = 2 * (len(blocks.sides) - 2) + 1
-    grid = _Sparse(values.new_zeros(nodes**3), _flat(CELLS * place, tables.nodes, nodes))
+    cells, rim = 2 * (len(blocks.sides) - 2), 2 * blocks.rim
+    own = _numbers(CELLS * place, cells + 1)
+    grid = _Sparse(values.new_zeros((cells + 1) ** 3), own, _numbers(CELLS * place, cells + 1, rim))
     guess = values @ tables.between
-    grid.values.index_copy_(0, grid.index.flatten(), guess.flatten())
+    grid.values.index_copy_(0, own.flatten(), guess.flatten())
+    guess = at(grid.values, grid.index)
     found = _exact(grid, rough, tables, evaluate)
     index = _flat(2 * place, tables.around, len(blocks.sides))
     side = at(blocks.sides, index).to(values) @ tables.touching
@@ -127,6 +154,9 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
         away = _columns((found - guess).abs_(), tables.parts).amax(1).t()
         error = torch.where(rough, away / GAIN, known)
     error = error.index_select(1, tables.eighth)
+    if rim:
+        border = _outer(CELLS * place, _NODES, cells, rim)
+        found = torch.where(border, found.clamp(min=_LEAST), found)
     cases = cell_cases(found < 0)
     sides = blocks.sides
     if not last:
@@ -135,7 +165,7 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
             sides = sides.repeat_interleave(2, axis)
         sides = F.pad(sides, (1,) * 6, value=1)
         _mark(sides, place, cases)
-    return Blocks(found, cases, error, place, sides)
+    return Blocks(found, cases, error, place, sides, rim)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +173,10 @@ class _Sparse:
     """A grid of which only some blocks have values."""
 
     values: Float[Tensor, " nodes"]
+    own: Int64[Tensor, "blocks 125"]
+    """Of the nodes of each block."""
     index: Int64[Tensor, "blocks 125"]
+    """Where their values are: for those in the rim, at its inner end."""
 
 
 def _exact(
@@ -153,20 +186,37 @@ def _exact(
     wanted = torch.zeros_like(grid.values, dtype=torch.bool)
     fresh = numbers_of(rough.to(grid.values) @ tables.fresh > 0)
     wanted.index_fill_(0, at(grid.index, fresh), True)
-    own = grid.index.index_select(1, tables.own)
+    own = grid.own.index_select(1, tables.own)
     # block after block: points that come one after the other are close together
     place = at(own, numbers_of(at(wanted, own)))
     grid.values.index_copy_(0, place, evaluate(place))
     return at(grid.values, grid.index)
 
 
-def _on_border(
-    blocks: Blocks, place: Int64[Tensor, "new 3"], tables: _Tables
-) -> Bool[Tensor, "new 27"]:
-    """Return which nodes of the coarser grid, of those that finer blocks come of, are outermost."""
-    last = len(blocks.sides) - 2
-    ticks = 2 * place[:, None] + tables.thirds
-    return ((ticks == 0) | (ticks == last)).any(2)
+def _in_blocks(values: Float[Tensor, "n n n"]) -> Float[Tensor, "blocks 125"]:
+    """Return the nodes of all blocks of a grid."""
+    for axis in range(3):
+        values = values.unfold(axis, _NODES, CELLS)
+    return values.flatten(3).flatten(0, 2)
+
+
+def _outer(
+    first: Int64[Tensor, "blocks 3"], side: int, cells: int, rim: int
+) -> Bool[Tensor, "blocks nodes"]:
+    """Return which nodes, so many along each axis from the first, are less than the rim within."""
+    ticks = first[..., None] + torch.arange(side, device=first.device)
+    x, y, z = ((ticks < rim) | (ticks > cells - rim)).unbind(1)
+    return (x[:, :, None, None] | y[:, None, :, None] | z[:, None, None]).flatten(1)
+
+
+def _numbers(
+    first: Int64[Tensor, "blocks 3"], count: int, rim: int = 0
+) -> Int64[Tensor, "blocks 125"]:
+    """Return the numbers of nodes of blocks in a grid; of those in the rim, of its inner end."""
+    ticks = first[..., None] + torch.arange(_NODES, device=first.device)
+    x, y, z = ticks.clamp(rim, count - 1 - rim).unbind(1)
+    plane = (x * count)[:, :, None] + y[:, None]
+    return ((plane * count)[..., None] + z[:, None, None]).flatten(1)
 
 
 def _columns(
@@ -217,9 +267,7 @@ def _tables(device: torch.device) -> _Tables:
         cells=_flat(2 * halves, halves, CELLS),
         eighth=_flat(torch.zeros(1, 3, dtype=torch.int64), places(CELLS) // 2, 2)[0],
         corners=_flat(halves, halves, 3),
-        thirds=places(3),
         steps=halves,
-        nodes=nodes,
         own=_flat(torch.zeros(1, 3, dtype=torch.int64), places(CELLS), _NODES)[0],
         between=between.reshape(27, -1),
         fresh=(within & (nodes % 2 > 0).any(1)).float(),

@@ -62,18 +62,23 @@ class ShapeConfig(BaseModel):
         return self.elements * self.width
 
     @property
+    def cut(self) -> bool:
+        """Return whether the box cuts the solid off: where the network works in it."""
+        return self.frame == "box"
+
+    @property
     def reach(self) -> float:
         """Return how far from the centre, along each axis, the surface is looked for.
 
-        What works in the box is cut off by its sides, a 32nd of the box within the border of
-        the grid: so a thin board that lies on a side has nodes, too.
+        Where the box cuts the solid off, of 32 cells the nodes beside the border lie just within
+        its sides: so a thin board that lies on a side has nodes, too.
         """
-        return 0.7 if self.frame == "longest" else _SIDE * 17 / 16
+        return _SIDE * 17 / 16 if self.cut else 0.7
 
     @property
-    def seen(self) -> float:
-        """Return how far the field itself counts; beyond it is as at the nearest point."""
-        return self.reach if self.frame == "longest" else _SIDE
+    def surface_reach(self) -> float:
+        """Return how far from the centre, along each axis, vertices may be."""
+        return _SIDE if self.cut else self.reach
 
 
 CONFIGS: dict[Edition, ShapeConfig] = {
