@@ -46,6 +46,9 @@ def random_batch(
     centre[:, -1] = centre[:, -2] + 0.2  # and two that collide
     touching = 0.5 + 0.5 * rand(scenes, n, n)
 
+    number = torch.arange(n)
+    nested = (number[:, None] + number) % 3 == 0
+
     def each(values: torch.Tensor) -> torch.Tensor:
         return values.expand(scenes, *values.shape).contiguous()
 
@@ -57,6 +60,7 @@ def random_batch(
         distance_score=rand(scenes, n),
         yaw_score=rand(scenes, n),
         built_in=torch.zeros(scenes, n, dtype=torch.bool),
+        nested=nested.expand(scenes, n, n),
         touching=(touching + touching.transpose(-1, -2)) / 2,
         touching_wall=0.2 + 0.8 * rand(scenes, n, m),
         on_floor=rand(scenes, n),

@@ -440,6 +440,24 @@ def test_what_is_before_a_door_makes_room():
     assert moved[0.0][1] > moved[1.0][1]
 
 
+def test_what_lies_in_another_box_stays():
+    scene = scene_of((0, 1.2, 0.4, 1, 2, 0.8, 0), (0.2, 1.2, 0.6, 0.4, 0.4, 0.3, 0))
+    moved = {}
+    for names in (("sofa", "cushion"), ("sofa", "basket")):
+        objects = with_objects(scene, category=torch.tensor([category_index(n) for n in names]))
+        for stay in (False, True):
+            settings = PRESETS["default"].model_copy(update={"nested_stay": stay})
+            found = arrange(objects, settings)
+            centre = found.scene.objects.boxes.centre
+            way = (centre - scene.objects.boxes.centre).norm(dim=-1).max()
+            moved[names[1], stay] = float(way)
+            left = stay and names[1] == "cushion"
+            assert found.certificate.after.colliding_pairs == int(left)
+    assert moved["cushion", True] < 1e-3
+    assert moved["cushion", False] > 0.1
+    assert moved["basket", True] == pytest.approx(moved["basket", False])
+
+
 def stuck_scene() -> Scene:
     """A pair that can be parted, and a box too large for the room with another in it."""
     return scene_of(

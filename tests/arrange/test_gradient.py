@@ -22,6 +22,7 @@ VARIANTS = {
             "tolerance": 0.08,
             "doubtful_yield": True,
             "firmness": 0.9,
+            "nested_stay": True,
         }
     ),
     "released with IoU": PRESETS["released"].model_copy(update={"projection": "iou"}),

@@ -11,7 +11,7 @@ from torch.nn.utils.rnn import pad_sequence
 
 from panoscene.arrange._checks import check_scene
 from panoscene.geometry import OrientedBoxes, wall_boxes
-from panoscene.scene import Scene, built_in, relations_from_boxes
+from panoscene.scene import Scene, built_in, nested, relations_from_boxes
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,8 @@ class ArrangementBatch:
     yaw_score: Float[Tensor, "scenes n"]
     built_in: Bool[Tensor, "scenes n"]
     """Doors and windows."""
+    nested: Bool[Tensor, "scenes n n"]
+    """Pairs of which one may well lie in the box of the other: cushions on sofas."""
     touching: Float[Tensor, "scenes n n"]
     touching_wall: Float[Tensor, "scenes n m"]
     on_floor: Float[Tensor, "scenes n"]
@@ -130,6 +132,7 @@ def collate_scenes(scenes: Sequence[Scene]) -> ArrangementBatch:
         distance_score=objects([o.distance_score for o in records]),
         yaw_score=objects([o.yaw_score for o in records]),
         built_in=objects([built_in(o.category) for o in records]) > 0,
+        nested=pairs([nested(o.category) for o in records], count) > 0,
         touching=pairs([r.touching for r in relations], count),
         touching_wall=pairs([r.touching_wall for r in relations], corners),
         on_floor=objects([r.on_floor for r in relations]),

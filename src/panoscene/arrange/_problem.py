@@ -194,6 +194,7 @@ def _confidence(batch: ArrangementBatch, settings: ArrangementSettings) -> Confi
     at, label = settings.thresholds, settings.label
     valid = batch.valid.to(batch.score.dtype)
     pair = batch.pair_valid.to(valid.dtype)
+    kept_apart = pair * ~batch.nested if settings.nested_stay else pair
     wall_pair = batch.wall_pair_valid.to(valid.dtype)
     inside = batch.inside_room
     if settings.inside_room_label == "confidence":
@@ -213,7 +214,7 @@ def _confidence(batch: ArrangementBatch, settings: ArrangementSettings) -> Confi
     symmetric = (batch.touching + batch.touching.transpose(-1, -2)) / 2
     most = batch.relative_yaw.amax(-1), batch.relative_yaw_wall.amax(-1)
     return Confidence(
-        object_pair=pair,
+        object_pair=kept_apart,
         inside_room=inside * valid,
         touching=_weight(symmetric, at.touching, label) * pair,
         touching_wall=touching_wall,

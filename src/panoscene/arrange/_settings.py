@@ -122,6 +122,9 @@ class ArrangementSettings(_Frozen):
     built_in_pace: float = Field(default=1.0, ge=0, le=1)
     """Part of a step that doors and windows go: with a small one, what is in their way makes
     room."""
+    nested_stay: bool = False
+    """Whether pairs of which one may lie in the box of the other may overlap: cushions on sofas,
+    plants in shelves (``panoscene.scene.nested``)."""
     collision: Literal["sum", "depth"] = "sum"
     """Object-object collision: overlap summed over the separating axes (paper), or the
     smallest one, which is how far the boxes must really move."""

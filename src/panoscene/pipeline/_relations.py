@@ -10,7 +10,7 @@ CONTACTS = ("touching", "touching_wall", "on_floor", "under_ceiling")
 """Relations that can be right although the boxes of an estimate leave a gap."""
 _GAP = 0.3
 _LIKELY = 0.5
-_UNLIKELY = 0.4
+_UNLIKELY = 0.3
 
 
 def box_relations(scene: Scene, tolerance: float = 0.1) -> Relations:
@@ -47,11 +47,11 @@ def held_relations(scene: Scene) -> Relations:
 def final_relations(scene: Scene, said: Relations | None) -> Relations:
     """Return the relations of a scene's boxes; of contacts the network has a say.
 
-    A contact that the boxes have holds, 1, unless a network finds it unlikely: below 0.4. One that
+    A contact that the boxes have holds, 1, unless a network finds it unlikely: below 0.3. One that
     they miss by at most 0.3 m, about the error of an estimate, holds where a network finds it
     likely, above 0.5, and is as probable as the network says. So no contact is told of what is
-    apart. The rule was chosen on homes of the training and the validation part, with the pose
-    network before today's; there it was better than either of the two alone.
+    apart. The rule was chosen on homes of the training and the validation part; there it is better
+    than either of the two alone.
 
     Args:
         scene: after the arrangement.

@@ -7,10 +7,13 @@ PHOTO = PRESETS["default"].model_copy(
         "name": "photo",
         "weights": PRESETS["default"].weights.model_copy(
             update={
+                "object_collision": 0.6,
+                "wall_collision": 0.2,
+                "relative_yaw": 0.03,
                 "relative_yaw_wall": 0.1,
-                "touching": 0.3,
+                "touching": 0.6,
                 "touching_wall": 0.6,
-                "on_floor": 1.2,
+                "on_floor": 2.0,
                 "direction": 1.6,
                 "distance": 0.3,
                 "size": 0.8,
@@ -18,10 +21,12 @@ PHOTO = PRESETS["default"].model_copy(
                 "reprojection": 0.0,
             }
         ),
-        "tolerance": 0.08,
+        "tolerance": 0.06,
+        "size_range": 1.15,
         "doubtful_yield": True,
-        "firmness": 0.9,
+        "firmness": 0.85,
         "built_in_pace": 0.1,
+        "nested_stay": True,
         "safe_by": "object",
     }
 )

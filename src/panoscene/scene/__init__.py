@@ -27,6 +27,7 @@ from ._files import write_scene as write_scene
 from ._graph import relation_graph as relation_graph
 from ._graph import write_graphml as write_graphml
 from ._images import read_panorama as read_panorama
+from ._nesting import nested as nested
 from ._openings import built_in as built_in
 from ._photos import relocate_photo as relocate_photo
 from ._photos import upright_photo as upright_photo

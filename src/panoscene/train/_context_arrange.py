@@ -19,7 +19,7 @@ from panoscene.models.context import (
     relation_probabilities,
 )
 from panoscene.models.context._walls import closed_polygon, walls_of
-from panoscene.scene import built_in
+from panoscene.scene import built_in, nested
 
 ARRANGED_WEIGHT = 10.0
 """Of each loss on arranged boxes (supplement, table of the outputs and loss weights)."""
@@ -65,6 +65,7 @@ def arrangement_batch(
         distance_score=output.output.distance_logit.softmax(dim=-1).amax(dim=-1),
         yaw_score=output.output.yaw_logit.softmax(dim=-1).amax(dim=-1),
         built_in=in_wall,
+        nested=nested(estimates.category) & valid[..., :, None] & valid[..., None, :],
         **scores,
         polygon=closed_polygon(estimates.polygon, estimates.wall_valid),
         walls=walls,
