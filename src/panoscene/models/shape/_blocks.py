@@ -140,13 +140,15 @@ def finer_blocks(blocks: Blocks, evaluate: Evaluate, *, last: bool = False) -> B
 
     cells, rim = 2 * (len(blocks.sides) - 2), 2 * blocks.rim
     own = _numbers(CELLS * place, cells + 1)
-    grid = _Sparse(values.new_zeros((cells + 1) ** 3), own, _numbers(CELLS * place, cells + 1, rim))
+    index = _numbers(CELLS * place, cells + 1, rim) if rim else own
+    grid = _Sparse(values.new_zeros((cells + 1) ** 3), own, index)
     guess = values @ tables.between
     grid.values.index_copy_(0, own.flatten(), guess.flatten())
-    guess = at(grid.values, grid.index)
+    if rim:
+        guess = at(grid.values, index)
     found = _exact(grid, rough, tables, evaluate)
-    index = _flat(2 * place, tables.around, len(blocks.sides))
-    side = at(blocks.sides, index).to(values) @ tables.touching
+    around = _flat(2 * place, tables.around, len(blocks.sides))
+    side = at(blocks.sides, around).to(values) @ tables.touching
     found = torch.where(side > 0, found.clamp(min=_LEAST), found)
     found = torch.where(side < 0, found.clamp(max=-_LEAST), found)
     error = known
