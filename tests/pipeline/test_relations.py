@@ -72,6 +72,19 @@ def test_what_the_boxes_have_holds_unless_the_network_finds_it_unlikely() -> Non
         assert torch.equal(found.relative_yaw, had.relative_yaw)
 
 
+def test_ceilings_are_touched_by_boxes_alone() -> None:
+    scene = scene_of(0.02)
+    top = scene.objects.boxes.centre[:, 2] + scene.objects.boxes.size[:, 2] / 2
+    low = replace(scene, layout=replace(scene.layout, ceiling_height=float(top.max()) + 0.05))
+    said = replace(sure(low, 0.0), under_ceiling=torch.zeros(len(top)))
+    found = final_relations(low, said).under_ceiling
+    assert bool(found.any())
+    assert torch.equal(found, box_relations(low).under_ceiling)
+    higher = replace(low, layout=replace(low.layout, ceiling_height=float(top.max()) + 0.2))
+    said = replace(sure(higher, 1.0), under_ceiling=torch.ones(len(top)))
+    assert not final_relations(higher, said).under_ceiling.any()
+
+
 def test_an_object_outside_the_room_touches_no_wall() -> None:
     scene = scene_of(-1.2)
     found = final_relations(scene, sure(scene, 0.99))
