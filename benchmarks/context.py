@@ -227,7 +227,8 @@ def _cell(value: float | None, key: str) -> str:
 
 LIMITS = (
     "AP is the standard mean over the categories present; of true BFoVs all have the same score.",
-    "Collisions are pairs of objects, and objects in walls, per scene. Relations are F1 (yaws:",
+    "Collisions are pairs of objects, and objects in walls, per scene; those of the trainings",
+    "without features are arranged with the settings of their day. Relations are F1 (yaws:",
     "mean error) between the objects whose BFoV shows a true one, whatever their boxes.",
     "",
     "## Limits",
