@@ -11,7 +11,7 @@ from panoscene.cli import main
 from panoscene.models.shape import ShapeStage
 from panoscene.pipeline import Stages
 from panoscene.pipeline._load import AtFirstUse
-from panoscene.scene import Objects, Shapes
+from panoscene.scene import Detections, Layout, Objects, Shapes, select_objects
 
 from .conftest import Knowing
 
@@ -24,8 +24,10 @@ class KnowingShape(ShapeStage):
 
     def __init__(self, knowing: Knowing) -> None:
         self.knowing = knowing
+        self.counts: list[int] = []
 
     def __call__(self, image: Tensor, objects: Objects, *, resolution: int = 64) -> Shapes:
+        self.counts.append(len(objects.boxes))
         return self.knowing.shape(image, objects, resolution=resolution)
 
     def codes(self, image: Tensor, objects: Objects) -> Tensor:
@@ -33,16 +35,20 @@ class KnowingShape(ShapeStage):
 
 
 @pytest.fixture(autouse=True)
-def quick(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> None:
+def shapes(knowing: Knowing, monkeypatch: pytest.MonkeyPatch) -> KnowingShape:
+    shape = KnowingShape(knowing)
+
+    def pose(image: Tensor, found: Detections, layout: Layout, height: float) -> Objects:
+        # those that come again stand where they did
+        objects = knowing.truth.objects
+        return select_objects(objects, torch.arange(len(found.score)) % len(objects.boxes))
+
     def load_stages() -> Stages:
-        # whatever detections there are, the boxes are as many
-        return knowing.stages(
-            pose=lambda image, found, layout, height: knowing.truth.objects,
-            shape=AtFirstUse(lambda: KnowingShape(knowing)),
-        )
+        return knowing.stages(pose=pose, shape=AtFirstUse(lambda: shape))
 
     monkeypatch.setattr(measure, "load_stages", load_stages)
     monkeypatch.setattr(measure, "_command_seconds", lambda: 7.5)
+    return shape
 
 
 def test_stages(capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,13 +58,14 @@ def test_stages(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(found[name] >= 0 for name in STAGES)
 
 
-def test_pipeline(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pipeline(capsys: pytest.CaptureFixture[str], shapes: KnowingShape) -> None:
     assert main(["bench", "pipeline", "--repeats", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     more = {"total_s", "cold_start_s", "peak_rss_mib", "objects", "repeats", "machine"}
     assert set(found) == PARTS | more
     assert found["total_s"] >= max(found[name] for name in PARTS)
     assert found["cold_start_s"] == 7.5
+    assert shapes.counts == [found["objects"]] * 2 == [20] * 2
     assert 50 < found["peak_rss_mib"] < 64_000
 
 

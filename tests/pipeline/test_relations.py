@@ -72,6 +72,17 @@ def test_what_the_boxes_have_holds_unless_the_network_finds_it_unlikely() -> Non
         assert torch.equal(found.relative_yaw, had.relative_yaw)
 
 
+def test_doubtful_objects_need_more_to_touch_a_wall() -> None:
+    scene = scene_of(0.02)
+    for score, limit in ((0.59, 0.45), (0.61, 0.3)):
+        doubted = replace(scene.objects, score=torch.full((2,), score))
+        some = replace(scene, objects=doubted)
+        for chance in (limit - 0.01, limit):
+            found = final_relations(some, sure(some, chance))
+            assert found.touching_wall.any() == (chance == limit)
+            assert found.touching.any() == found.on_floor.any() == (chance >= 0.3)
+
+
 def test_ceilings_are_touched_by_boxes_alone() -> None:
     scene = scene_of(0.02)
     top = scene.objects.boxes.centre[:, 2] + scene.objects.boxes.size[:, 2] / 2

@@ -10,7 +10,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from panoscene.arrange import PRESETS, collate_scenes, optimise_boxes
+from panoscene.arrange import collate_scenes, optimise_boxes
 from panoscene.data import (
     ESTIMATES,
     EncodedObjects,
@@ -23,6 +23,7 @@ from panoscene.models import WeightsHeader, read_weights_header, write_weights
 from panoscene.models.context import CONFIGS, ContextOutput, RelationBatch
 from panoscene.models.pose import CONFIGS as POSE_CONFIGS
 from panoscene.models.pose import PoseOutput, build_pose
+from panoscene.pipeline import PHOTO
 from panoscene.pipeline._relations import held_relations
 from panoscene.scene import Scene
 from panoscene.synth.dataset import open_dataset
@@ -270,9 +271,11 @@ def test_unrolled_batch_is_that_of_the_arrangement(folder: Path) -> None:
         scenes = seen.refined(task.network, task._said, task.shape_config)
         held = [replace(scene, relations=held_relations(scene)) for scene in scenes]
         expected = collate_scenes(held)
-        settings = PRESETS["default"].model_copy(update={"steps": 2, "safe": False})
+        settings = PHOTO.model_copy(update={"steps": 2, "safe": False})
         found, wanted = optimise_boxes(batch, settings), optimise_boxes(expected, settings)
     assert bool(expected.built_in.any())
+    assert torch.equal(batch.built_in, expected.built_in)
+    assert torch.equal(batch.nested, expected.nested)
     for name in ("touching", "farther_than", "inside_room", "relative_yaw_wall", "yaw_score"):
         assert torch.allclose(getattr(batch, name), getattr(expected, name), atol=1e-5), name
     assert torch.allclose(found.centre, wanted.centre, atol=1e-4)

@@ -11,8 +11,8 @@ ROWS: Mapping[str, ExportedMethod] = MappingProxyType(
     {
         "full": ExportedMethod(
             "ours",
-            "the whole pipeline; the relations are those of its boxes, and contacts that the"
-            " network thinks likely where boxes are at most 0.3 m apart",
+            "the whole pipeline; the relations are those of its boxes, without contacts that the"
+            " network thinks unlikely, with those it thinks likely where at most 0.3 m are between",
             compared_with=("without-arrangement", "pose"),
         ),
         "without-arrangement": ExportedMethod(

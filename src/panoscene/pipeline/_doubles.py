@@ -3,11 +3,13 @@
 from panoscene.geometry import box_nms
 from panoscene.scene import Scene, select
 
-_SAME_OBJECT = 0.15
+_SAME_OBJECT = 0.1
 """IoU of boxes of one category that are the same object: no two things of one category overlap in
 the training and the validation homes."""
-_SAME_PLACE = 0.5
-"""And of boxes of any categories: two things are not in one place. Less costs accuracy there."""
+_SAME_PLACE = 0.3
+"""And of boxes of any categories: two things are not in one place. In those homes no two have more
+than 0.11. Of the boxes that this limit leaves out there, one in four was right; that costs average
+precision, which counts every further guess, and spares the scene three false objects."""
 
 
 def without_doubles(scene: Scene) -> Scene:

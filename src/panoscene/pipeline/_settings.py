@@ -7,7 +7,7 @@ PHOTO = PRESETS["default"].model_copy(
         "name": "photo",
         "weights": PRESETS["default"].weights.model_copy(
             update={
-                "object_collision": 0.6,
+                "object_collision": 2.0,
                 "wall_collision": 0.2,
                 "relative_yaw": 0.03,
                 "relative_yaw_wall": 0.1,
