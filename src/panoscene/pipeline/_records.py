@@ -25,7 +25,7 @@ class Given:
     """Boxes for the arrangement to start from; no detector and no pose network is run."""
     relations: Relations | None = None
     """Relations for the arrangement, instead of those that the networks or its first boxes say.
-    Those of the finished scene are its boxes'; of contacts these have a network's say."""
+    The finished scene has those of its boxes; which contacts hold, these decide with them."""
     upright_from_photo: tuple[tuple[float, float, float], ...] | None = None
     """Rotation that makes the photo upright; no tilt is looked for."""
 
