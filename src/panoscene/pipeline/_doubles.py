@@ -5,7 +5,7 @@ from panoscene.scene import Scene, select
 
 _SAME_OBJECT = 0.1
 """IoU of boxes of one category that are the same object: no two things of one category overlap in
-the training and the validation homes."""
+the training and the validation homes (``benchmarks/true_overlaps.py``)."""
 _SAME_PLACE = 0.3
 """And of boxes of any categories: two things are not in one place. In those homes no two have more
 than 0.11. Of the boxes that this limit leaves out there, one in four was right; that costs average
