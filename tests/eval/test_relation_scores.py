@@ -124,6 +124,21 @@ def test_missed_objects_do_not_vanish():
     assert scores["relative_yaw_error_deg"] is None
 
 
+def test_all_relations_in_one_pool():
+    """Of three cubes the third is found, and rightly said to stand on the floor, in the room."""
+    found = scene((2.45, 2.45, 0.5), category=["table"])
+    record = relation_record(found, three())
+    counts = [getattr(record, name) for name in YES_OR_NO if name != "farther_than"]
+    hits = sum(one.true_positive for one in counts)
+    wrong = sum(one.false_positive + one.invented for one in counts)
+    lost = sum(one.false_negative + one.missed for one in counts)
+    scores = score_relations([record])
+    assert hits > 0 < lost
+    assert scores["all_f1_end_to_end"] == pytest.approx(2 * hits / (2 * hits + wrong + lost))
+    assert scores["all_compared"] == sum(sum(one[:4]) for one in counts)
+    assert scores["all_f1"] == 1.0
+
+
 def test_invented_objects_do_not_vanish():
     """The target has the first cube only; the prediction claims contact with a ghost."""
     target = scene((0, 0, 0.5))

@@ -17,7 +17,7 @@ from PIL import Image
 from panoscene.arrange import arrange
 from panoscene.geometry import OrientedBoxes
 from panoscene.sample import sample_room_path
-from panoscene.scene import Layout, Mesh, Scene, Shapes, read_scene
+from panoscene.scene import CATEGORIES, Layout, Mesh, Scene, Shapes, read_scene
 from panoscene.synth import perturb_scene, sample_room
 from panoscene.views._pieces import View, make_plan
 from panoscene.views._report import FOLDER, write_report
@@ -191,6 +191,18 @@ def test_report_and_plan_agree_on_what_is_outside(tolerance: float) -> None:
         assert hatched == {k for k, fault in enumerate(faults) if fault and "outside" in fault}
         told += len(hatched)
     assert 20 < told < 100
+
+
+def test_what_lies_in_a_box_is_no_fault() -> None:
+    scene = room(3, 2)
+    boxes = scene.objects.boxes
+    together = replace(boxes, centre=boxes.centre[[0, 0]])
+    places = {name: CATEGORIES.index(name) for name in ("plant", "shelf", "table")}
+    for inner, expected in (("plant", 0), ("table", 2)):
+        category = torch.tensor([places[inner], places["shelf"]])
+        objects = replace(scene.objects, boxes=together, category=category)
+        told = box_faults(replace(scene, objects=objects))
+        assert sum("overlaps" in (fault or "") for fault in told) == expected
 
 
 def test_names_cannot_break_out(tmp_path: Path) -> None:

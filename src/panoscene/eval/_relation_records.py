@@ -64,6 +64,7 @@ class RelationRecord:
 
 YES_OR_NO = tuple(field.name for field in fields(RelationRecord) if field.type is RelationCounts)
 """Relations that hold or do not."""
+_OF_EVERY_PAIR = "farther_than"
 TURNS = tuple(field.name for field in fields(RelationRecord) if field.type is YawErrors)
 """Relations that are angles."""
 
@@ -79,6 +80,9 @@ def score_relations(records: Sequence[RelationRecord]) -> dict[str, float | None
     - ``f1_end_to_end``, ``tpr_end_to_end``, ``precision_end_to_end``: target relations of objects
       that were not found count as missed, predicted relations of objects that do not exist as
       false
+
+    ``all_f1`` and the others that begin with ``all``: of these relations together, all answers in
+    one pool, without ``farther_than``, which holds for one direction of every pair.
 
     For ``relative_yaw`` and ``relative_yaw_wall``:
 
@@ -110,9 +114,11 @@ def relations_of_sums(sums: Float[np.ndarray, " columns"]) -> dict[str, float | 
     """Return ``score_relations`` for added rows of ``relation_sums``."""
     numbers = iter(sums.tolist())
     scores: dict[str, float | None] = {"scenes": next(numbers)}
-    for name in YES_OR_NO:
-        counts = _yes_or_no(*islice(numbers, len(RelationCounts._fields)))
-        scores |= {f"{name}_{key}": value for key, value in counts.items()}
+    counts = {name: tuple(islice(numbers, len(RelationCounts._fields))) for name in YES_OR_NO}
+    pooled = [counts[name] for name in YES_OR_NO if name != _OF_EVERY_PAIR]
+    counts["all"] = tuple(map(sum, zip(*pooled, strict=True)))
+    for name, some in counts.items():
+        scores |= {f"{name}_{key}": value for key, value in _yes_or_no(*some).items()}
     for name in TURNS:
         compared, in_target, bin_error, error = islice(numbers, len(YawErrors._fields))
         scores |= {

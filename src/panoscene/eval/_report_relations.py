@@ -24,7 +24,7 @@ def relations_part(scores: Sequence[ScoreFile]) -> list[str]:
         "## Relations",
         "Are the relation scores right? In percent and end to end: relations of missed objects "
         "count as missed, those of invented objects as false. TPR is the share of true relations "
-        "that is claimed.",
+        "that is claimed. All: the answers to the five kinds in one pool.",
         score_table(scores, END_TO_END),
         _against_rule(scores, END_TO_END),
         "The same between matched objects only, as in the paper: a method that finds fewer "

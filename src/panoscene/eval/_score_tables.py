@@ -68,6 +68,7 @@ MATCHED_RECALL: tuple[Column, ...] = (
     ),
 )
 END_TO_END: tuple[Column, ...] = (
+    _percent("all F1", "relations.all_f1_end_to_end"),
     _percent("touching F1", "relations.touching_f1_end_to_end"),
     _percent("TPR", "relations.touching_tpr_end_to_end"),
     _percent("wall F1", "relations.touching_wall_f1_end_to_end"),
@@ -77,6 +78,7 @@ END_TO_END: tuple[Column, ...] = (
     _percent("in room F1", "relations.inside_room_f1_end_to_end"),
 )
 MATCHED_RELATIONS: tuple[Column, ...] = (
+    _percent("all F1", "relations.all_f1"),
     _percent("touching F1", "relations.touching_f1"),
     _percent("TPR", "relations.touching_tpr"),
     _percent("TNR", "relations.touching_tnr"),

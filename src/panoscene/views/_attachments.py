@@ -7,11 +7,9 @@ import shapely
 import torch
 from jaxtyping import Float, Int64
 
-from panoscene.geometry import OrientedBoxes, box_footprint, penetration_depth, wall_normals
+from panoscene.geometry import OrientedBoxes, box_footprint, wall_normals
 from panoscene.scene import Layout, Relations
 
-_TOLERANCE = 0.01
-"""Metres of penetration from which it is shown."""
 _INTO = 0.09
 """Metres that the line of a contact reaches into what it joins."""
 Segments = Float[np.ndarray, "segments 2 3"]
@@ -64,12 +62,6 @@ def joints_from_relations(relations: Relations) -> Joints:
 def footprints(boxes: OrientedBoxes) -> list[shapely.Polygon]:
     """Return the boxes from above."""
     return [shapely.Polygon(ring) for ring in box_footprint(boxes).double().numpy(force=True)]
-
-
-def colliding_pairs(boxes: OrientedBoxes) -> Int64[np.ndarray, "pairs 2"]:
-    """Return the pairs of boxes that overlap by more than a centimetre."""
-    depth = penetration_depth(boxes[:, None], boxes[None, :]).triu(diagonal=1)
-    return (depth > _TOLERANCE).nonzero().numpy(force=True)
 
 
 def clashes(boxes: OrientedBoxes, pairs: Int64[np.ndarray, "pairs 2"]) -> list[Clash]:

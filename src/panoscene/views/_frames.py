@@ -30,7 +30,6 @@ from panoscene.style import (
 from panoscene.views._attachments import (
     Joints,
     clashes,
-    colliding_pairs,
     footprints,
     level_contacts,
     object_contacts,
@@ -41,6 +40,7 @@ from panoscene.views._canvas import Canvas, font
 from panoscene.views._image_files import picture_from_image
 from panoscene.views._model import build_model
 from panoscene.views._painter import Shade
+from panoscene.views._pieces import colliding_pairs
 from panoscene.views._render import render_model
 
 HEADER, FOOTER = 46, 64
@@ -81,7 +81,7 @@ def draw_frame(stage: Stage, boxes: OrientedBoxes, number: int, title: str) -> I
         number: of this frame, from 0, for the curve.
         title: heading.
     """
-    pairs = colliding_pairs(boxes)
+    pairs = colliding_pairs(replace(stage.scene.objects, boxes=boxes))
     picture = Image.new("RGB", stage.size_px, PAPER)
     left, right = stage.panels
     _draw_above(stage, boxes, pairs, left).onto(picture, 0, HEADER)

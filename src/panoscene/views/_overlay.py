@@ -91,7 +91,7 @@ def overlay_page(
     _draw_layout(page, curves, unit)
     if reference is not None:
         _draw_reference(page, scene, reference, unit)
-    pairs = colliding_pairs(scene.objects.boxes, tolerance)
+    pairs = colliding_pairs(scene.objects, tolerance)
     colliding = set(pairs.flatten().tolist())
     _draw_objects(page, scene, curves, colliding, unit)
     if labels:

@@ -7,9 +7,18 @@ import numpy as np
 import shapely
 import torch
 from jaxtyping import Float, Int64
+from torch import Tensor
 
 from panoscene.geometry import OrientedBoxes, box_footprint, penetration_depth, wall_normals
-from panoscene.scene import BUILT_IN, CATEGORIES, Relations, Scene, relations_from_boxes
+from panoscene.scene import (
+    BUILT_IN,
+    CATEGORIES,
+    Objects,
+    Relations,
+    Scene,
+    nested,
+    relations_from_boxes,
+)
 from panoscene.style import MOST_WALL, NO_FRONT, OVERHEAD, WALL_THICKNESS
 
 TOLERANCE = 0.01
@@ -141,7 +150,7 @@ def make_plan(scene: Scene, view: View, *, relations: bool, tolerance: float = T
     thickness = min(WALL_THICKNESS * view.scale, MOST_WALL)
     corners = view.page(_footprints(boxes))
     footprints = [shapely.Polygon(corner) for corner in corners]
-    pairs = colliding_pairs(boxes, tolerance)
+    pairs = colliding_pairs(scene.objects, tolerance)
     colliding = set(pairs.flatten().tolist())
     grown = floor.buffer(tolerance * view.scale, join_style="mitre")
     with_walls = floor.buffer(max(tolerance, IN_WALL) * view.scale, join_style="mitre")
@@ -183,12 +192,16 @@ def _footprints(boxes: OrientedBoxes) -> Float[np.ndarray, "n 4 2"]:
     return box_footprint(boxes).double().numpy(force=True)
 
 
-def colliding_pairs(
-    boxes: OrientedBoxes, tolerance: float = TOLERANCE
-) -> Int64[np.ndarray, "pairs 2"]:
-    """Return the pairs of objects that overlap by more than some metres."""
-    depth = penetration_depth(boxes[:, None], boxes[None, :]).triu(diagonal=1)
-    return (depth > tolerance).nonzero().numpy(force=True)
+def colliding_pairs(objects: Objects, tolerance: float = TOLERANCE) -> Int64[np.ndarray, "pairs 2"]:
+    """Return the pairs of objects that overlap by more than some metres and should not."""
+    return (overlaps(objects).triu(diagonal=1) > tolerance).nonzero().numpy(force=True)
+
+
+def overlaps(objects: Objects) -> Float[Tensor, "n n"]:
+    """Return by how many metres boxes overlap; 0 for such as a cushion on its sofa."""
+    boxes = objects.boxes
+    depth = penetration_depth(boxes[:, None], boxes[None, :])
+    return depth.masked_fill(nested(objects.category), 0.0).fill_diagonal_(0.0)
 
 
 def _outside(

@@ -11,7 +11,6 @@ from panoscene.arrange import COLLISION_TERMS, OBSERVATION_TERMS, Certificate, V
 from panoscene.geometry import (
     OrientedBoxes,
     box_footprint,
-    penetration_depth,
     polygon_turn,
     signed_distance_to_polygon,
 )
@@ -27,7 +26,7 @@ from panoscene.scene import (
     room_surfaces,
 )
 from panoscene.style import GROUP_COLOURS, NO_FRONT, WALL_THICKNESS, group_of, words
-from panoscene.views._pieces import IN_WALL, TOLERANCE
+from panoscene.views._pieces import IN_WALL, TOLERANCE, overlaps
 from panoscene.views._report_colours import PALETTES, category_colour
 
 Values = dict[str, object]
@@ -77,14 +76,13 @@ def report_data(
 def box_faults(scene: Scene, tolerance: float = TOLERANCE) -> list[str | None]:
     """Return what is physically wrong with each object, from some metres on, or None.
 
-    Doors and windows may be in the walls. What is outside the room is told even where inside_room
-    says that it belongs there, as the pictures from above hatch it.
+    Doors and windows may be in the walls, cushions in sofas (``nested``). What is outside the room
+    is told even where inside_room says that it belongs there, as the pictures from above hatch it.
     """
     boxes, names = scene.objects.boxes, object_names(scene.objects)
     if len(boxes) == 0:
         return []
-    depth = penetration_depth(boxes[:, None], boxes[None, :]).fill_diagonal_(0.0)
-    deepest, partner = depth.max(dim=1)
+    deepest, partner = overlaps(scene.objects).max(dim=1)
     outside = _distance_outside(boxes, scene.layout)
     allowed = [
         max(tolerance, IN_WALL) if CATEGORIES[k] in BUILT_IN else tolerance

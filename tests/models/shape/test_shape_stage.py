@@ -1,6 +1,7 @@
 """Surfaces of fields, and the stage from photo to shapes."""
 
 import math
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -291,6 +292,7 @@ def test_crumbs_alone_are_no_solid() -> None:
 
 def test_threads_that_work_alone_give_back_what_they_took() -> None:
     before, found, entered = torch.get_num_threads(), [], threading.Event()
+    turn, turns = sys.getswitchinterval(), []
 
     def first() -> None:
         with alone() as threads:
@@ -304,6 +306,7 @@ def test_threads_that_work_alone_give_back_what_they_took() -> None:
         with alone() as threads:
             found.append(threads)
             time.sleep(0.2)
+            turns.append(sys.getswitchinterval())
         found.append(torch.get_num_threads())
 
     torch.set_num_threads(3)
@@ -318,5 +321,7 @@ def test_threads_that_work_alone_give_back_what_they_took() -> None:
         later.join()
         assert found == [3] * 5
         assert torch.get_num_threads() == 3
+        # the second one outlives the first, and has the short turns up to its end
+        assert turns[0] < turn == sys.getswitchinterval()
     finally:
         torch.set_num_threads(before)

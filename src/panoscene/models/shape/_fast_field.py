@@ -14,7 +14,7 @@ NEGLIGIBLE = 2e-3
 """Elements whose Gaussian times constant is smaller at all points of a group are left out there."""
 _GROUP = 32
 """Neighbouring points that are worked on together."""
-_ROWS, _BLOCKS = 8, 64
+_ROWS, _BLOCKS = 8, 128
 """Groups of one element in a block, and blocks worked on together: as the cache of a core holds."""
 _POINTS = 65_536
 

@@ -11,7 +11,7 @@ from panoscene.scene import Mesh
 
 FACES_PER_CELL = 32
 """Triangles that a mesh may have for each cell along an axis: 2,048 at resolution 64."""
-_BOLDNESS = 5.0
+_BOLDNESS = 7.0
 """Of the library, from 0 to 10: the lower, the longer it takes, and the more triangles are left."""
 _MOST_TOUCHING = 200
 """Edges with more than two triangles that are mended."""

@@ -21,7 +21,7 @@ from ._cubes import (
 )
 from ._fewer import fitted, unfolded
 
-_FLAT = (0.985, 0.93)
+_FLAT = (0.97, 0.9)
 """A block, and an eighth of one, are flat where normals add up to that share of their number."""
 _BITS = 6
 _OWN = 1 << _BITS

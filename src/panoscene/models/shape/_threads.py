@@ -1,5 +1,6 @@
 """Pieces of work side by side: threads that help one another on small tensors mostly wait."""
 
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,13 +13,19 @@ Piece = TypeVar("Piece")
 Found = TypeVar("Found")
 
 
+_TURN = 0.0005
+"""Seconds after which a thread lets another have its turn in Python: most pieces between two
+operations are shorter, and the other thread has nothing else to do."""
+
+
 class _Alone:
-    """How many blocks PyTorch works alone in, and how many threads it has otherwise."""
+    """How many blocks PyTorch works alone in, and how it is otherwise."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
         self.blocks = 0
         self.threads = 1
+        self.turn = _TURN
 
 
 _ALONE = _Alone()
@@ -34,6 +41,8 @@ def alone() -> Iterator[int]:
     with _ALONE.lock:
         if _ALONE.blocks == 0:
             _ALONE.threads = torch.get_num_threads()
+            _ALONE.turn = sys.getswitchinterval()
+            sys.setswitchinterval(min(_TURN, _ALONE.turn))
         _ALONE.blocks += 1
         threads = _ALONE.threads
     torch.set_num_threads(1)
@@ -42,6 +51,8 @@ def alone() -> Iterator[int]:
     finally:
         with _ALONE.lock:
             _ALONE.blocks -= 1
+            if _ALONE.blocks == 0:
+                sys.setswitchinterval(_ALONE.turn)
             torch.set_num_threads(threads)
 
 
