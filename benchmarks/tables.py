@@ -202,9 +202,14 @@ def layout_text() -> dict[str, str]:
         rooms = val["panoramas"]
         texts["layout-worse"] = (
             f"On {val['part']} it is worse in {round(row['worse'] * rooms)} of {rooms} rooms, by "
-            f"at most {row['most_worse']:.3f}."
+            f"at most {row['most_worse']:.3f}"
         )
     row, rooms = homes["rows"]["network"], homes["panoramas"]
+    if "layout-worse" in texts:
+        texts["layout-worse"] += (
+            f", on the test homes in {round(row['worse'] * rooms)} of {rooms}, by at most "
+            f"{row['most_worse']:.3f}."
+        )
     texts["layout-ambiguous"] = (
         f"It is set for {round(row['ambiguous'] * rooms)} of the {rooms} rooms of the test homes, "
         f"whose 3D IoU is {row['iou_3d_ambiguous']:.2f} on average, and {row['iou_3d_clear']:.2f} "

@@ -57,6 +57,7 @@ def test_others_keep_their_order() -> None:
     objects = replace(objects, score=torch.tensor([0.2, 0.5, 0.4, 0.9]))
     kept = without_doubles(scene_of(objects)).objects
     assert kept.boxes.centre[:, 0].tolist() == pytest.approx([0.0, 2.0, -2.0])
+    assert kept.id == ("chair_0", "chair_1", "chair_2")
 
 
 def test_no_objects_no_doubles() -> None:

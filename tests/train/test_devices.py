@@ -16,9 +16,11 @@ from panoscene.train import (
     chosen_precision,
     fast_bfloat16,
     on_device,
+    read_train_recipe,
     recipe_text,
     train,
 )
+from panoscene.train._devices import chosen_devices
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="the GPU decides")
@@ -45,6 +47,62 @@ def test_without_the_packages_of_training(
     monkeypatch.setitem(sys.modules, "lightning_fabric", None)
     with pytest.raises(TrainError, match=r"lightning_fabric is missing.*panoscene\[train\]"):
         train(tiny_recipe(), tmp_path, tiny_task)
+
+
+@pytest.mark.parametrize(
+    ("asked", "gpus", "expected"),
+    [
+        (("auto", 8, 1), 0, 1),
+        (("auto", 8, 1), 8, 8),
+        (("auto", 8, 1), 3, 2),  # three do not share eight samples
+        (("auto", 6, 1), 16, 6),
+        (("auto", 1, 1), 4, 1),
+        (("auto", 8, 2), 8, 4),
+        ((4, 8, 2), 8, 4),
+        ((2, 8, 1), 0, 2),
+        ((3, 8, 1), 8, "batch_size: found 8.*3 devices"),
+        ((8, 8, 2), 8, "batch_size: found 8.*8 devices times 2 machines"),
+        (("auto", 1, 2), 1, "batch_size: found 1.*1 devices times 2 machines"),
+        ((4, 8, 1), 2, "devices: found 4, expected at most the 2 GPUs"),
+    ],
+)
+def test_devices_share_a_batch_evenly(
+    tiny_recipe: Callable[..., TrainRecipe],
+    asked: tuple[int | str, int, int],
+    gpus: int,
+    expected: int | str,
+) -> None:
+    """Asked for: devices, samples of a batch, machines."""
+    devices, batch, machines = asked
+    recipe = tiny_recipe(devices=devices, batch_size=batch, num_nodes=machines, accumulate=1)
+    if isinstance(expected, int):
+        assert chosen_devices(recipe, gpus, {"TORCHELASTIC_RUN_ID": "a"}) == expected
+        return
+    with pytest.raises(TrainError, match=expected):
+        chosen_devices(recipe, gpus, {"TORCHELASTIC_RUN_ID": "a"})
+
+
+def test_machines_must_know_of_each_other(tiny_recipe: Callable[..., TrainRecipe]) -> None:
+    recipe = tiny_recipe(batch_size=8, num_nodes=2, accumulate=1)
+    assert chosen_devices(recipe, 0, {"SLURM_NTASKS": "2"}) == 1
+    with pytest.raises(TrainError, match=r"num_nodes: found 2.*torchrun or SLURM"):
+        chosen_devices(recipe, 0, {})
+
+
+def test_the_documented_commands_share_their_batches(root: Path) -> None:
+    """Of the section on many GPUs: devices times machines divide the batch of the recipe."""
+    text = (root / "docs" / "train.md").read_text()
+    part = text.split("## Many GPUs, many machines")[1].split("##")[0].replace("\\\n", " ")
+    commands = [line for line in part.splitlines() if "panoscene train" in line]
+    assert len(commands) == 2
+    for line in commands:
+        words = line.split()
+        values = {word: words[k + 1] for k, word in enumerate(words[:-1]) if word.startswith("--")}
+        recipe = read_train_recipe(root / values["--recipe"])
+        devices, machines = int(values["--devices"]), int(values.get("--nodes", 1))
+        changes = {"devices": devices, "num_nodes": machines}
+        found = chosen_devices(recipe.model_copy(update=changes), devices, {"SLURM_NTASKS": "2"})
+        assert found == devices
 
 
 def test_batches_of_any_shape_are_moved() -> None:

@@ -10,15 +10,18 @@ from torch import Tensor
 
 from panoscene.data import (
     PoseAugmentation,
+    StageRecord,
     code_of,
     collate_pose,
     pose_sample,
     read_pose_scenes,
+    write_stage_record,
 )
 from panoscene.geometry import OrientedBoxes
 from panoscene.models.pose import CONFIGS, PoseOutput, build_pose, pose_losses
 from panoscene.scene import (
     MEAN_SIZE,
+    Detections,
     Layout,
     Panorama,
     Scene,
@@ -127,6 +130,20 @@ def test_recipes_are_sound() -> None:
         recipe.stage_options(PoseOptions)
     recipe = TrainRecipe(stage="pose", edition="compact", steps=1, batch_size=1, learning_rate=1e-3)
     with pytest.raises(TrainError, match="data: found none"):
+        pose_task(recipe)
+
+
+def test_detections_of_other_panoramas_are_refused(tmp_path: Path) -> None:
+    strangers = tmp_path / "records"
+    strangers.mkdir()
+    none = torch.zeros(0)
+    record = StageRecord(Detections(torch.zeros(0, 4), none.long(), none), None)
+    write_stage_record(record, strangers / "home9999-0.json")
+    recipe = TrainRecipe(
+        stage="pose", edition="compact", steps=1, batch_size=1, learning_rate=1e-3, data=SAMPLES,
+        options={"detections": str(tmp_path)},
+    )  # fmt: skip
+    with pytest.raises(TrainError, match="found records of other panoramas only"):
         pose_task(recipe)
 
 

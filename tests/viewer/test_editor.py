@@ -227,6 +227,17 @@ def test_solving_clears_a_collision(colliding: Scene) -> None:
     assert solved.scene.relations is editor.scene.relations
 
 
+def test_a_cushion_in_a_sofa_is_no_trouble(colliding: Scene) -> None:
+    assert float(measure_scene(colliding).trouble[0]) > 0.15
+    category = colliding.objects.category.clone()
+    category[:2] = torch.tensor([category_index(name) for name in ("sofa", "cushion")])
+    objects = dataclasses.replace(colliding.objects, category=category)
+    found = measure_scene(dataclasses.replace(colliding, objects=objects))
+    assert not found.overlaps
+    assert float(found.trouble[0]) == 0
+    assert found.violations.colliding_pairs == 1
+
+
 def test_a_solve_that_changes_nothing_is_no_step(empty: Scene) -> None:
     editor = Editor.open(empty).solve()
     assert editor.state.certificate is not None

@@ -65,6 +65,7 @@ class RelationRecord:
 YES_OR_NO = tuple(field.name for field in fields(RelationRecord) if field.type is RelationCounts)
 """Relations that hold or do not."""
 _OF_EVERY_PAIR = "farther_than"
+"""Holds in one of the two directions of each pair, whatever the scene."""
 TURNS = tuple(field.name for field in fields(RelationRecord) if field.type is YawErrors)
 """Relations that are angles."""
 

@@ -1,7 +1,9 @@
 """One object, one box."""
 
+from dataclasses import replace
+
 from panoscene.geometry import box_nms
-from panoscene.scene import Scene, select
+from panoscene.scene import CATEGORIES, Scene, select
 
 _SAME_OBJECT = 0.1
 """IoU of boxes of one category that are the same object: no two things of one category overlap in
@@ -16,13 +18,19 @@ def without_doubles(scene: Scene) -> Scene:
     """Return a scene without the boxes that a box of higher score has the place of.
 
     A detector finds some objects twice, as two parts or as two categories, which BFoVs do not
-    tell. The arrangement would push the boxes apart and leave two objects.
+    tell. The arrangement would push the boxes apart and leave two objects. What is left is numbered
+    anew, so that names agree with the numbers in pictures.
 
     Args:
-        scene: as estimated.
+        scene: as estimated; names are a category and a number.
     """
     objects = scene.objects
     kept = box_nms(objects.boxes, objects.score, objects.category, iou_threshold=_SAME_OBJECT)
     again = box_nms(objects.boxes[kept], objects.score[kept], iou_threshold=_SAME_PLACE)
     kept = kept[again].sort().values
-    return scene if len(kept) == len(objects.boxes) else select(scene, kept)
+    if len(kept) == len(objects.boxes):
+        return scene
+    left = select(scene, kept)
+    categories = enumerate(left.objects.category.tolist())
+    names = tuple(f"{CATEGORIES[category]}_{k}" for k, category in categories)
+    return replace(left, objects=replace(left.objects, id=names))

@@ -1,6 +1,7 @@
 """Where a training runs, and with what precision."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from lightning_fabric import Fabric
 
 _CPU_INFO = Path("/proc/cpuinfo")
+_STARTED_BY = ("TORCHELASTIC_RUN_ID", "SLURM_NTASKS", "GROUP_RANK", "NODE_RANK")
+"""Variables by which a machine knows its place among several: of torchrun, of SLURM, by hand."""
 
 
 def fast_bfloat16(cpu_info: Path = _CPU_INFO) -> bool:
@@ -42,8 +45,8 @@ def start_fabric(recipe: TrainRecipe, run: Path) -> "Fabric":
     SLURM did so already.
 
     Raises:
-        TrainError: The packages of the extra ``train`` are missing.
-        ValueError: There are not as many GPUs.
+        TrainError: The packages of the extra ``train`` are missing, or the devices are not there,
+            do not share a batch evenly, or are on machines that do not know of each other.
     """
     try:
         from lightning_fabric import Fabric  # noqa: PLC0415
@@ -54,9 +57,7 @@ def start_fabric(recipe: TrainRecipe, run: Path) -> "Fabric":
     if recipe.threads is not None:
         torch.set_num_threads(recipe.threads)
     gpus = torch.cuda.device_count() if torch.cuda.is_available() else 0
-    devices = max(1, gpus) if recipe.devices == "auto" else recipe.devices
-    if gpus and devices > gpus:
-        raise ValueError(f"devices: found {devices}, expected at most the {gpus} GPUs of {run}")
+    devices = chosen_devices(recipe, gpus)
     several = devices * recipe.num_nodes > 1
     fabric = Fabric(
         accelerator="gpu" if gpus else "cpu",
@@ -70,6 +71,49 @@ def start_fabric(recipe: TrainRecipe, run: Path) -> "Fabric":
     if recipe.threads is not None:
         torch.set_num_threads(recipe.threads)  # launching may have changed it
     return fabric
+
+
+def chosen_devices(
+    recipe: TrainRecipe, gpus: int, environment: Mapping[str, str] = os.environ
+) -> int:
+    """Return how many devices of each machine a training takes.
+
+    With ``auto`` those are as many GPUs as share a batch evenly, or the CPU.
+
+    Args:
+        recipe: Of the training.
+        gpus: That are there.
+        environment: Variables, by which several machines know of each other.
+
+    Raises:
+        TrainError: There are not as many, a batch cannot be shared, or nothing has started the
+            program on several machines, so that it would wait for them for ever.
+    """
+    machines, parts = recipe.num_nodes, recipe.accumulate
+    if machines > 1 and not any(name in environment for name in _STARTED_BY):
+        reason = (
+            f"num_nodes: found {machines}, and nothing that started the program on all of them; "
+            "expected torchrun or SLURM"
+        )
+        raise TrainError("recipe", reason)
+    most = recipe.batch_size // (parts * machines)
+    wanted = min(max(1, gpus), max(1, most)) if recipe.devices == "auto" else recipe.devices
+    if gpus and wanted > gpus:
+        reason = f"devices: found {wanted}, expected at most the {gpus} GPUs of this machine"
+        raise TrainError("recipe", reason)
+
+    def shared(devices: int) -> bool:
+        return recipe.batch_size % (devices * machines * parts) == 0
+
+    if recipe.devices == "auto":
+        wanted = next((n for n in range(wanted, 0, -1) if shared(n)), wanted)
+    if not shared(wanted):
+        reason = (
+            f"batch_size: found {recipe.batch_size}, expected a multiple of {wanted} devices "
+            f"times {machines} machines times {parts} parts"
+        )
+        raise TrainError("recipe", reason)
+    return wanted
 
 
 @contextmanager

@@ -78,6 +78,9 @@ class PoseTask(Task):
         folder = self.options.detections
         found = {} if folder is None else read_stage_records(folder)
         self.scenes = read_pose_scenes(training_panoramas(data, recipe), found)
+        if folder is not None and all(scene.found is None for scene in self.scenes):
+            reason = "found records of other panoramas only, expected some of the training part"
+            raise TrainError(folder, reason)
         self.validation = read_pose_scenes(open_dataset(data, "val")[:], found)
         imagenet = recipe.imagenet and recipe.start is None
         self.network = build_pose(self.network_config, imagenet=imagenet)

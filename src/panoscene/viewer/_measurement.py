@@ -13,7 +13,7 @@ from panoscene.geometry import (
     penetration_depth,
     signed_distance_to_polygon,
 )
-from panoscene.scene import Relations, Scene, relations_from_boxes
+from panoscene.scene import Relations, Scene, nested, relations_from_boxes
 
 SHOWN_FROM = 0.01
 """Metres of overlap, or outside the room, from which an object is shown as in trouble; the
@@ -41,7 +41,7 @@ class Measurement:
     violations: Violations
     """Energy and violations as in a certificate of the preset ``default``."""
     overlaps: tuple[Overlap, ...]
-    """Pairs that overlap by at least a centimetre, the deepest first."""
+    """Pairs that overlap by at least a centimetre and should not, the deepest first."""
     outside: Float[Tensor, " n"]
     """Metres by which each object that belongs in the room reaches out of it."""
     relations: Relations
@@ -66,6 +66,7 @@ def measure_scene(scene: Scene) -> Measurement:
     violations = arrange(scene, _LOOK).certificate.before
     boxes = scene.objects.boxes
     depth = penetration_depth(boxes[:, None], boxes[None, :]).triu(1)
+    depth = depth.masked_fill(nested(scene.objects.category), 0.0)
     first, second = (depth >= SHOWN_FROM).nonzero().unbind(1)
     found = zip(first.tolist(), second.tolist(), depth[first, second].tolist(), strict=True)
     overlaps = sorted((Overlap(a, b, d) for a, b, d in found), key=lambda overlap: -overlap.depth)

@@ -35,7 +35,7 @@ PREDICATE_WORDS = {
     "touching": "touches",
     "on_floor": "stands on",
     "under_ceiling": "hangs from",
-    "inside_room": "is inside",
+    "inside_room": "belongs inside",
     "farther_than": "is farther than",
     "relative_yaw": "turn to",
 }
@@ -187,7 +187,7 @@ def _certificate(certificate: Certificate) -> Values:
         "Changed": "yes" if certificate.changed else "no",
         "Converged": "yes" if certificate.converged else "no",
         "Largest change of size": f"{100 * (certificate.largest_size_change - 1):.1f} %",
-        "Left outside the room": str(certificate.left_outside),
+        "Not meant to be inside, left there": str(certificate.left_outside),
     }
     return {
         "outcome": certificate.outcome,
@@ -214,7 +214,7 @@ def _measures(before: Violations, after: Violations) -> list[Values]:
         ("Pairs that collide by over 10 cm", "colliding_pairs", "{:.0f}", 1.0),
         ("Worst overlap of two objects", "worst_penetration", metres, 100.0),
         ("Sum of all overlaps", "total_penetration", metres, 100.0),
-        ("Farthest outside the room", "worst_out_of_room", metres, 100.0),
+        ("Farthest outside, of what belongs inside", "worst_out_of_room", metres, 100.0),
         ("Volume outside the room", "out_of_room_volume", "{:.3f} m³", 1.0),
     ]
     rows: list[Values] = []
