@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from lightning_fabric import Fabric
 
 _CPU_INFO = Path("/proc/cpuinfo")
-_STARTED_BY = ("TORCHELASTIC_RUN_ID", "SLURM_NTASKS", "GROUP_RANK", "NODE_RANK")
-"""Variables by which a machine knows its place among several: of torchrun, of SLURM, by hand."""
+_STARTED_BY = (
+    "TORCHELASTIC_RUN_ID", "SLURM_NTASKS", "LSB_JOBID", "OMPI_COMM_WORLD_SIZE", "PMI_SIZE",
+    "GROUP_RANK", "NODE_RANK",
+)  # fmt: skip
+"""Variables by which a machine knows its place among several (the last by hand)."""
 
 
 def fast_bfloat16(cpu_info: Path = _CPU_INFO) -> bool:

@@ -62,7 +62,7 @@ def trouble_list(scene: Scene, found: Measurement) -> str:
         if depth >= SHOWN_FROM
     ]
     if not rows:
-        return "Nothing overlaps, and nothing is out of the room."
+        return "Nothing overlaps that should not, and nothing is out of the room."
     rows.sort(key=lambda row: -row[0])
     lines = [f"- {words}: {100 * depth:.0f} cm" for depth, words in rows[:MOST_ROWS]]
     if len(rows) > MOST_ROWS:

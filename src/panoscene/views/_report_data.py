@@ -35,7 +35,7 @@ PREDICATE_WORDS = {
     "touching": "touches",
     "on_floor": "stands on",
     "under_ceiling": "hangs from",
-    "inside_room": "belongs inside",
+    "inside_room": "is (partly) inside",
     "farther_than": "is farther than",
     "relative_yaw": "turn to",
 }
