@@ -17,6 +17,7 @@
     python benchmarks/curves.py NAME=RUN_FOLDER ...
     python benchmarks/rolls.py DATA
     python benchmarks/shape_scores.py RECIPE WEIGHTS
+    panoscene eval score RUN -o results/more
     python benchmarks/tables.py
 
 With --check it writes nothing and exits 1 when a table is stale.
@@ -29,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from curve_tables import curves_text
+from relation_tables import relation_texts
 
 from panoscene.cli._measure_pipeline import seconds_table
 from panoscene.eval import (
@@ -46,6 +48,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = (
     "README.md",
     "docs/arrange.md",
+    "docs/context.md",
     "docs/detector.md",
     "docs/eval.md",
     "docs/layout.md",
@@ -98,6 +101,7 @@ def tables() -> dict[str, str]:
         **detector_text(),
         **layout_text(),
         **pose_text(),
+        **relation_texts(),
         **rolls_text(),
         **shape_tables(_measured("shape_scores")),
         **synth_text(),

@@ -11,6 +11,8 @@ from typing import Any, NoReturn
 import pytest
 import torch
 
+from panoscene.eval import read_scores
+
 
 def test_tables_are_up_to_date(
     root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -44,3 +46,18 @@ def test_measurements_are_json(root: Path):
     assert files
     for file in files:
         json.loads(file.read_text(), parse_constant=refuse)
+
+
+def test_the_second_test_says_what_the_pages_say(root: Path):
+    """README.md and docs/context.md tell in words what these numbers are."""
+    full = read_scores(root / "results" / "more" / "full.json")
+    rule, before = full.differences["pose"], full.differences["without-arrangement"]
+    for ending in ("f1", "f1_end_to_end"):
+        for kind in ("touching", "on_floor", "inside_room", "all"):
+            assert (rule[f"relations.{kind}_{ending}"].low or 0) > 0, (kind, ending)
+        for kind in ("touching_wall", "under_ceiling"):
+            assert (rule[f"relations.{kind}_{ending}"].value or 0) > 0, (kind, ending)
+    assert (rule["relations.touching_wall_f1_end_to_end"].low or 0) > 0
+    assert (before["plausibility.paper_colliding_pairs"].high or 0) < 0
+    for percent in (25, 50):
+        assert (before[f"detection.ap_{percent}_mean_57"].low or 0) > 0
