@@ -14,6 +14,10 @@ KINDS = {
     "under_ceiling": "under the ceiling",
     "inside_room": "inside the room",
 }
+YAWS = {
+    "relations.relative_yaw_error_deg": "yaw between objects, mean error in degrees",
+    "relations.relative_yaw_wall_error_deg": "yaw to walls, mean error in degrees",
+}
 BOXES = {
     "detection.ap_15_mean_57": ("AP 15, %", 100),
     "detection.ap_25_mean_57": ("AP 25, %", 100),
@@ -43,21 +47,28 @@ def rule_table() -> str:
                 row += [_value(score.metrics[name]) for score in (rule, full)]
                 row.append(_gain(full.differences["pose"][name]))
             lines.append(f"| {' | '.join(row)} |")
+        for name, words in YAWS.items():
+            row = [f"{homes}, {full.scenes} panoramas", words, *"---"]
+            row += [_value(score.metrics[name], 1) for score in (rule, full)]
+            row.append(_gain(full.differences["pose"][name], 1))
+            lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines)
 
 
 def boxes_table() -> str:
-    """Return what the arrangement gains and costs."""
+    """Return what the arrangement makes of the refined boxes, and of the pose network's."""
     lines = [
-        "| homes | | before the arrangement | after | difference |",
-        "| --- | --- |" + " ---: |" * 3,
+        "| homes | | not arranged | arranged | difference | pose network's boxes, arranged |",
+        "| --- | --- |" + " ---: |" * 4,
     ]
     for homes in FOLDERS:
         full, before = _score(homes, "full"), _score(homes, "without-arrangement")
+        alone = _score(homes, "pose-arranged")
         for name, (words, factor) in BOXES.items():
             values = [_value(score.metrics[name], factor) for score in (before, full)]
             gain = _gain(full.differences["without-arrangement"][name], factor)
             row = [f"{homes}, {full.scenes} panoramas", words, *values, gain]
+            row.append(_value(alone.metrics[name], factor))
             lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines)
 
